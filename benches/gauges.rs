@@ -17,7 +17,7 @@ use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::design::{self, Design, Inputs, Simulated};
 use hapdef::evaluation::{Chooser, EVERYWHERE, EstimatorKind, Evaluation};
 use hapdef::io::mesh_file::read_mesh;
-use hapdef::io::svg::{self, Series};
+use hapdef::io::svg::{self, PlotSeries};
 use hapdef::mesh::repair::Repair;
 use hapdef::mesh::unroll::Axis;
 use hapdef::placement::{Selection, SelectorKind, SensorSet};
@@ -404,7 +404,7 @@ fn agreement_of(text: &mut String, quick: bool) {
         );
         let mut points: Vec<(f64, f64)> = held_out.into_iter().zip(promised).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        series.push(Series { name, points });
+        series.push(PlotSeries { name, points });
     }
     text.push('\n');
     if !quick {
@@ -413,13 +413,13 @@ fn agreement_of(text: &mut String, quick: bool) {
 }
 
 /// Every set at every force, and where promises are kept.
-fn picture(mut series: Vec<Series>) -> String {
+fn picture(mut series: Vec<PlotSeries>) -> String {
     const STYLE: &str = "<style>text{font:12px sans-serif;fill:#222}.t{font-weight:bold}.grid{stroke:#ddd}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>";
     let most = (series.iter())
         .flat_map(|s| &s.points)
         .map(|p| p.0.max(p.1))
         .fold(0.0, f64::max);
-    series.push(Series {
+    series.push(PlotSeries {
         name: "as promised",
         points: vec![(0.0, 0.0), (most, most)],
     });

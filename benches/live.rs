@@ -13,21 +13,23 @@ use std::sync::mpsc::channel;
 use std::time::Instant;
 
 use glam::DVec3;
-use hapdef::board::{Drawn, Faults, Options, Script};
+use hapdef::board::{BoardOptions, Faults, PressScript, RandomPresses};
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::elasticity::sensitivity::Sensitivity;
 use hapdef::inference::{
-    Deviations, Errors, Features, KnownPress, Lessons, Matching, ResponseMap, Trained, calibrate,
-    cramer_rao,
+    Deviations, Features, KnownPress, LiveLessons, Matching, ReadingErrors, ResponseMap,
+    TrainedLive, calibrate, cramer_rao,
 };
-use hapdef::link::{Address, BAUD, Doorway, Hosted, Listener, Pace, SessionEvent, State, host};
+use hapdef::link::{
+    Address, BAUD, ConnectionState, Doorway, Hosted, Listener, Pace, SessionEvent, host,
+};
 use hapdef::live::{Input, Pipeline, Receiver};
 use hapdef::regression::Hyper;
-use hapdef::uncertainty::{Gluing, Making, Pressing, Uncertainty};
-use hapdef::wire::{Hello, Message, VERSION, encode};
+use hapdef::uncertainty::{Gluing, HandPressing, Making, Uncertainty};
+use hapdef::wire::{Hello, VERSION, WireMessage, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -97,7 +99,7 @@ struct Lab {
     sensing: Sensing,
     touches: Vec<Touch>,
     /// With all gauges and with one failed: raw, normalized.
-    trained: [[Trained; 2]; 2],
+    trained: [[TrainedLive; 2]; 2],
 }
 
 /// Where readings come from, and what the estimators think of them.
@@ -246,7 +248,7 @@ impl Lab {
             })
             .collect();
         let off = Uncertainty {
-            pressing: Pressing::EXACT,
+            pressing: HandPressing::EXACT,
             ..self.sensing.off
         };
         calibrate(&self.sensing.drawn, &known, &vec![NOISE; gains.len()], &off)
@@ -313,10 +315,10 @@ impl Lab {
     fn row(&self, scene: &Scene, failed: bool, forces: [f64; 2]) -> Row {
         let gauges = scene.gains.len();
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let errors = Errors {
+        let errors = ReadingErrors {
             relative: scene.relative,
             deviations: scene.deviations.clone(),
-            ..Errors::of_noise(NOISE, gauges)
+            ..ReadingErrors::of_noise(NOISE, gauges)
         };
         let mut matching = Matching::new(Arc::clone(&scene.map), errors, 60.0);
         matching.used[FAILED] = !failed;
@@ -378,9 +380,9 @@ impl Lab {
         };
         let samples: Vec<Vec<f64>> = self.touches.iter().map(|t| press(t, &mut rng)).collect();
         let again: Vec<Vec<f64>> = self.touches.iter().map(|t| press(t, &mut rng)).collect();
-        let errors = Errors {
+        let errors = ReadingErrors {
             relative: 0.03,
-            ..Errors::of_noise(NOISE, gains.len())
+            ..ReadingErrors::of_noise(NOISE, gains.len())
         };
         let mut matching = Matching::new(Arc::clone(&self.sensing.drawn.map), errors, 60.0);
         let contacts: Vec<_> = samples.iter().map(|x| matching.find(x)).collect();
@@ -408,9 +410,10 @@ impl Lab {
     }
 
     /// A board at a port of its own, glued by a workshop and touched at random by 2 to 15 N.
-    fn touched_board(&self, options: Options, faults: Faults) -> Hosted {
+    fn touched_board(&self, options: BoardOptions, faults: Faults) -> Hosted {
         let places = board::places(&self.inputs, &self.sensing, SEED).expect("places");
-        let script = Script::random(places, Drawn::usual([2.0, 15.0], Making::EXACT), 1);
+        let script =
+            PressScript::random(places, RandomPresses::usual([2.0, 15.0], Making::EXACT), 1);
         let made = board::simulated(
             &self.inputs,
             &self.sensing,
@@ -432,7 +435,7 @@ impl Lab {
         /// Until when it is watched (s of the board's time).
         const UNTIL: f64 = 25.0;
         let hosted = self.touched_board(
-            Options {
+            BoardOptions {
                 rate_hz: RATE_HZ,
                 ..board::options(&self.inputs, CHANNELS)
             },
@@ -484,8 +487,8 @@ impl Lab {
         let (mut gone, mut back, mut delays) = (Vec::new(), Vec::new(), None);
         Listener::new(address, pipeline)
             .run(&stop, &inbox, |heard| match heard {
-                SessionEvent::State(State::Gone) => gone.push(hosted.seconds()),
-                SessionEvent::State(State::Live) => back.push(hosted.seconds()),
+                SessionEvent::State(ConnectionState::Gone) => gone.push(hosted.seconds()),
+                SessionEvent::State(ConnectionState::Live) => back.push(hosted.seconds()),
                 SessionEvent::Turn { timing, .. } if hosted.seconds() > 17.0 => {
                     delays = timing.quantile(0.5).zip(timing.quantile(0.99));
                     stop.store(true, Ordering::Relaxed);
@@ -552,9 +555,9 @@ fn read(
         .collect()
 }
 
-fn train(sensing: &Sensing, inputs: &Inputs, used: &[bool]) -> [Trained; 2] {
+fn train(sensing: &Sensing, inputs: &Inputs, used: &[bool]) -> [TrainedLive; 2] {
     let lesson = sensing.lessons(inputs, 3200, SEED).expect("lessons");
-    let lessons = |jitter| Lessons {
+    let lessons = |jitter| LiveLessons {
         x: &lesson.x,
         places_mm: &lesson.places_mm,
         forces: &lesson.forces,
@@ -565,8 +568,8 @@ fn train(sensing: &Sensing, inputs: &Inputs, used: &[bool]) -> [Trained; 2] {
     };
     let hyper = Hyper::default();
     [
-        Trained::train(Features::Raw, &lessons(0.0), &hyper),
-        Trained::train(Features::Normalized, &lessons(0.03), &hyper),
+        TrainedLive::train(Features::Raw, &lessons(0.0), &hyper),
+        TrainedLive::train(Features::Normalized, &lessons(0.03), &hyper),
     ]
 }
 
@@ -593,7 +596,7 @@ fn frames(text: &mut String) {
         rate_hz: 1000,
         name: String::new(),
     };
-    encode(&Message::Hello(hello), 0, 0, 12, &mut bytes);
+    encode(&WireMessage::Hello(hello), 0, 0, 12, &mut bytes);
     receiver.push(&bytes, 0, |_| {});
     let memory = resident_megabytes();
     let before = cpu_seconds();
@@ -601,7 +604,7 @@ fn frames(text: &mut String) {
         bytes.clear();
         let counts = (0..CHANNELS).map(|c| count(k, c)).collect();
         encode(
-            &Message::Data(counts),
+            &WireMessage::Data(counts),
             k as u16,
             (k * 100) as u32,
             12,
@@ -769,7 +772,7 @@ fn soak(minutes: f64) {
     let mut backwards = 0;
     Listener::new(address, pipeline)
         .run(&stop, &inbox, |heard| match heard {
-            SessionEvent::State(State::Gone) => unplugs += 1,
+            SessionEvent::State(ConnectionState::Gone) => unplugs += 1,
             SessionEvent::Sample { update, .. } => {
                 touched += u64::from(update.contact.is_some());
                 left_out += u64::from(update.strain.is_some() && update.good < 10);

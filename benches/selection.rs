@@ -18,7 +18,7 @@ use hapdef::placement::greedy_svr::{Audit, Comparison, GreedySvr, TOLERANCE};
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
 use hapdef::placement::pca_qr::PcaQr;
-use hapdef::placement::{Constraints, Pool, Request, Selection, Selector};
+use hapdef::placement::{Constraints, Pool, Selection, SelectionRequest, Selector};
 use hapdef::regression::folds::evenly;
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Grouping, Hyper};
@@ -166,7 +166,7 @@ fn on_one_core<T: Send>(work: impl FnOnce() -> T + Send) -> (T, f64) {
 
 fn choose(selector: &(dyn Selector + Sync), part: &Part, sensors: usize) -> (Selection, f64) {
     on_one_core(|| {
-        let request = Request {
+        let request = SelectionRequest {
             constraints: &Constraints::count(sensors),
             watch: &unwatched,
             found: &|_| (),
@@ -372,7 +372,7 @@ fn cancel(text: &mut String, both: &Both) {
             }
             ControlFlow::Break(())
         };
-        let request = Request {
+        let request = SelectionRequest {
             constraints: &Constraints::count(10),
             watch: &watch,
             found: &|_| (),

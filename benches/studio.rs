@@ -18,11 +18,11 @@ use hapdef::cli;
 use hapdef::design::{InHand, Inputs};
 use hapdef::document::Layer;
 use hapdef::io::project_file::LoadedProject;
-use hapdef::io::study_folder::{Cost, Outcome, StudyFolder};
+use hapdef::io::study_folder::{StudyFolder, UnitCost, UnitOutcome};
 use hapdef::mesh::TriMesh;
 use hapdef::parameter_study::Points;
 use hapdef::plain::robust_top;
-use hapdef::project::{Kept, KeptError, Masks, Project};
+use hapdef::project::{KeptError, KeptSelection, Masks, Project};
 use hapdef::render::offscreen::{self, Canvas};
 use hapdef::studio::{Studio, Tab, Tool};
 use timing::{cpu_seconds, reference_seconds};
@@ -286,7 +286,7 @@ fn boxes(window: &mut Window) -> f64 {
 fn plots(window: &mut Window) -> f64 {
     let state = &mut window.studio.session.document.state;
     state.project.kept = (0..8)
-        .map(|k| Kept {
+        .map(|k| KeptSelection {
             name: format!("selection {k}"),
             selector: "by-hand".into(),
             quality: Quality::Draft,
@@ -386,7 +386,7 @@ fn many_designs(home: &std::path::Path, units: usize) -> PathBuf {
             ("error_mm", of(1) / of(2)),
             ("mass_g", of(0) * of(1).sqrt()),
         ];
-        let outcome = Outcome {
+        let outcome = UnitOutcome {
             version: folder.plan.version.clone(),
             study: folder.plan.study.clone(),
             base: folder.plan.base.clone(),
@@ -398,7 +398,7 @@ fn many_designs(home: &std::path::Path, units: usize) -> PathBuf {
             error: None,
             cautions: Vec::new(),
         };
-        let cost = Cost {
+        let cost = UnitCost {
             unit,
             cpu_seconds: 1.0,
             seconds: 1.0,

@@ -10,7 +10,7 @@ use std::process::Command;
 
 use hapdef::cli;
 use hapdef::io::together::Together;
-use hapdef::io::trade_file::{self, Record};
+use hapdef::io::trade_file::{self, TradeRecord};
 
 const POINTS: &str = "40";
 
@@ -36,6 +36,6 @@ fn begin_anew_unless_it_holds(folder: &Path) {
         return;
     }
     let place = Together::claim(folder).expect("nobody else measures here");
-    let record = Record::new(&inputs, rayon::current_num_threads());
+    let record = TradeRecord::new(&inputs, rayon::current_num_threads());
     trade_file::write(&place, &inputs.project, &record).expect("the folder can be written to");
 }

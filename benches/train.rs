@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use hapdef::budget::unwatched;
 use hapdef::dataset::SignalMatrix;
 use hapdef::io::dataset_file;
-use hapdef::learning::{Family, Lessons, Scores, Still, Trained, TrainingRequest, train, update};
+use hapdef::learning::{
+    Family, MeasuredTouches, Scores, Still, TrainedEstimator, TrainingRequest, train, update,
+};
 use hapdef::regression::Grouping;
 use hapdef::study::Data;
 use rand::{RngExt, SeedableRng};
@@ -79,14 +81,15 @@ fn skin(path: &Path) -> String {
 }
 
 fn row(data: &Data, groups: &[usize], asked: &TrainingRequest) -> String {
-    let lessons = Lessons {
+    let lessons = MeasuredTouches {
         x: &data.x,
         places_mm: &data.targets,
         forces: &data.forces,
         groups,
     };
     let before = cpu_seconds();
-    let trained: Trained = train(&lessons, asked, &unwatched).expect("enough to learn from");
+    let trained: TrainedEstimator =
+        train(&lessons, asked, &unwatched).expect("enough to learn from");
     let seconds = cpu_seconds() - before;
     let by = if asked.family.is_some() {
         ""
@@ -132,7 +135,7 @@ fn wear(path: &Path) -> String {
         let (presses, judged) = others.split_at(few);
         let before = cpu_seconds();
         let (x, places, groups) = some(&worn, &data, presses);
-        let lessons = Lessons {
+        let lessons = MeasuredTouches {
             x: &x,
             places_mm: &places,
             forces: &[],
@@ -161,9 +164,9 @@ fn wear(path: &Path) -> String {
     text
 }
 
-fn learned(x: &SignalMatrix, data: &Data, touches: &[usize]) -> Trained {
+fn learned(x: &SignalMatrix, data: &Data, touches: &[usize]) -> TrainedEstimator {
     let (x, places, groups) = some(x, data, touches);
-    let lessons = Lessons {
+    let lessons = MeasuredTouches {
         x: &x,
         places_mm: &places,
         forces: &[],

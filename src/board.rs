@@ -14,17 +14,17 @@ use crate::draw::normal;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Push, Touch};
 use crate::inference::Chain;
-use crate::wire::{Decoder, Event, Hello, Message, VERSION, encode};
+use crate::wire::{Decoded, Decoder, Hello, VERSION, WireMessage, encode};
 
 use disturbance::Disturbed;
 
 pub use disturbance::Disturbances;
 pub use fault::{ChannelFault, Fault, Faults, Illness};
-pub use script::{Drawn, GivenPress, PRESSES, Press, RAMP_S, Script, aside};
+pub use script::{GivenPress, PRESSES, PressScript, RAMP_S, RandomPresses, ScriptedPress, aside};
 
 /// How the board measures.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub struct BoardOptions {
     /// Of noise, drift, gluing and random touches.
     pub seed: u64,
     /// Of the data at first (Hz).
@@ -82,11 +82,11 @@ impl Truth {
 
 /// The board between two calls.
 pub struct SimulatedBoard {
-    options: Options,
+    options: BoardOptions,
     faults: Faults,
     sensitivity: Sensitivity,
     gains: Vec<f64>,
-    script: Script,
+    script: PressScript,
     offsets: Vec<f64>,
     drift: Vec<f64>,
     held: Vec<u32>,
@@ -128,8 +128,8 @@ impl SimulatedBoard {
     pub fn new(
         sensitivity: Sensitivity,
         gains: Vec<f64>,
-        script: Script,
-        options: Options,
+        script: PressScript,
+        options: BoardOptions,
         faults: Faults,
     ) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
@@ -206,14 +206,14 @@ impl SimulatedBoard {
     pub fn receive(&mut self, bytes: &[u8], now_us: u64, out: &mut Vec<u8>) {
         let mut received = Vec::new();
         self.ears.push(bytes, |event| {
-            if let Event::Message { message, .. } = event {
+            if let Decoded::Message { message, .. } = event {
                 received.push(message);
             }
         });
         for message in received {
             match message {
-                Message::AskHello => self.send(&Message::Hello(self.hello()), now_us, out),
-                Message::Start => {
+                WireMessage::AskHello => self.send(&WireMessage::Hello(self.hello()), now_us, out),
+                WireMessage::Start => {
                     if !self.streaming {
                         let now_s = now_us as f64 * 1e-6;
                         self.script.leave_alone(now_s + REST_S);
@@ -221,15 +221,15 @@ impl SimulatedBoard {
                     self.streaming = true;
                     self.next_us = self.next_us.max(now_us);
                 }
-                Message::Stop => {
+                WireMessage::Stop => {
                     self.streaming = false;
                     self.next_hello_us = now_us + HELLO_EVERY;
                 }
-                Message::Rate(hertz) => {
+                WireMessage::Rate(hertz) => {
                     self.rate_hz = hertz.clamp(1, FASTEST);
-                    self.send(&Message::Hello(self.hello()), now_us, out);
+                    self.send(&WireMessage::Hello(self.hello()), now_us, out);
                 }
-                Message::Ping(token) => self.send(&Message::Pong(token), now_us, out),
+                WireMessage::Ping(token) => self.send(&WireMessage::Pong(token), now_us, out),
                 _ => {}
             }
         }
@@ -240,18 +240,18 @@ impl SimulatedBoard {
         if !self.streaming {
             if now_us >= self.next_hello_us {
                 self.next_hello_us = now_us + HELLO_EVERY;
-                self.send(&Message::Hello(self.hello()), now_us, out);
+                self.send(&WireMessage::Hello(self.hello()), now_us, out);
             }
             return;
         }
         while self.next_us <= now_us {
             let time_us = self.next_us;
             let (counts, pushes) = self.sample(time_us);
-            self.send(&Message::Data(counts), time_us, out);
+            self.send(&WireMessage::Data(counts), time_us, out);
             tell(Truth::of(time_us, &pushes));
             self.next_us += 1_000_000 / u64::from(self.rate_hz);
             if time_us / STATUS_EVERY != self.next_us / STATUS_EVERY {
-                let status = Message::Status {
+                let status = WireMessage::Status {
                     overruns: self.overruns,
                     temperature_centi: Some(2300),
                 };
@@ -260,7 +260,7 @@ impl SimulatedBoard {
         }
     }
 
-    fn send(&mut self, message: &Message, time_us: u64, out: &mut Vec<u8>) {
+    fn send(&mut self, message: &WireMessage, time_us: u64, out: &mut Vec<u8>) {
         let mut frame = Vec::new();
         encode(
             message,
@@ -270,7 +270,7 @@ impl SimulatedBoard {
             &mut frame,
         );
         self.sequence = self.sequence.wrapping_add(1);
-        let data = matches!(message, Message::Data(_));
+        let data = matches!(message, WireMessage::Data(_));
         self.faults.spoil(&frame, data, &mut self.rng, out);
     }
 

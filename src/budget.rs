@@ -326,7 +326,7 @@ pub struct Budget {
 /// measured setting turns (`hapdef trade`), without those that were found to buy nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Limits {
+pub struct BudgetLimits {
     /// Estimated error of the displacement (%) at which no elements are added; that of strains follows it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub elements_percent: Option<f64>,
@@ -356,7 +356,7 @@ pub struct Limits {
     pub tuning_touches: Option<usize>,
 }
 
-impl Limits {
+impl BudgetLimits {
     /// Whether none is given.
     #[must_use]
     pub fn are_none(&self) -> bool {
@@ -367,7 +367,7 @@ impl Limits {
 impl Budget {
     /// The same with limits in place of some of its own.
     #[must_use]
-    pub fn within(mut self, limits: &Limits) -> Self {
+    pub fn within(mut self, limits: &BudgetLimits) -> Self {
         if let Some(percent) = limits.elements_percent {
             let elements = &mut self.elements;
             elements.strain_percent *= percent / elements.displacement_percent;

@@ -21,7 +21,7 @@ use crate::gauge::Gauge;
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::uncertainty::Making;
 
-use site::{Moments, gauges_on};
+use site::{StrainMoments, gauges_on};
 use std::f64::consts::PI;
 
 pub use columns::Columns;
@@ -325,7 +325,7 @@ pub fn simulate(
                 for (k, row) in rows.iter_mut().enumerate() {
                     responses.row_into(3 * i + k, row);
                 }
-                let moments = Moments::of(&rows[0], &rows[1], &rows[2]);
+                let moments = StrainMoments::of(&rows[0], &rows[1], &rows[2]);
                 let turned = (i % directions) as f64 * PI / directions as f64;
                 let angle = (moments.dominant_angle() + turned) % PI;
                 let frame = observer.frames()[i];
@@ -432,7 +432,7 @@ mod tests {
         let (c, s) = (angle.cos(), angle.sin());
         let e = [1.0, -2.0, 0.5];
         let component = |k: f64| e.map(|e| e * k);
-        let m = Moments::of(
+        let m = StrainMoments::of(
             &component(c * c),
             &component(s * s),
             &component(2.0 * c * s),

@@ -61,7 +61,7 @@ pub use self::meshed::Meshed;
 pub use self::nearness::*;
 pub use self::pipeline::*;
 pub use self::presses::{Press, PressReadings};
-pub use self::reduce::{Located, Reduced, reduce_sites};
+pub use self::reduce::{Located, ReducedSites, reduce_sites};
 pub use self::reference::Reference;
 pub use self::refine::refine;
 pub use self::sensing::*;

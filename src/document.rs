@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::design::{Inputs, check_shape};
 use crate::io::project_file::LoadedProject;
-use crate::mesh::geodesic::{March, Scratch};
+use crate::mesh::geodesic::{March, MarchScratch};
 use crate::mesh::repair::Repair;
 use crate::mesh::{RepairReport, TriMesh};
 use crate::project::{ChosenSite, PartModel};
@@ -19,11 +19,11 @@ pub use inputs::{
     ReductionInputs, SelectionInputs, SensingInputs, SimulationInputs, TradeInputs, WallInputs,
 };
 pub use paint::Brush;
-pub use state::{Layer, State};
+pub use state::{DocumentState, Layer};
 
 /// An open project.
 pub struct Document {
-    pub state: State,
+    pub state: DocumentState,
     pub part: Arc<TriMesh>,
     pub repairs: RepairReport,
     /// Where it was opened from or saved to; nothing for the bundled limb until it is saved.
@@ -33,16 +33,16 @@ pub struct Document {
     pub bundled: bool,
     /// The ways over the part: a brush asks for them many times a second.
     march: March,
-    scratch: Scratch,
+    scratch: MarchScratch,
     /// Body and repairs that the part was taken in with.
     taken_in: (usize, Repair),
     /// Why nothing can be computed on the part, whatever its project, where that is so.
     misshapen: Option<String>,
-    saved: State,
+    saved: DocumentState,
     /// The state at the last finished gesture.
-    settled: State,
-    past: Vec<State>,
-    future: Vec<State>,
+    settled: DocumentState,
+    past: Vec<DocumentState>,
+    future: Vec<DocumentState>,
 }
 
 /// Undo steps kept.
@@ -51,7 +51,7 @@ const DEPTH: usize = 200;
 impl Document {
     #[must_use]
     pub fn new(loaded: LoadedProject, path: Option<PathBuf>) -> Self {
-        let state = State {
+        let state = DocumentState {
             project: loaded.inputs.project,
             painted: loaded.inputs.painted,
             masks: loaded.inputs.masks,
@@ -61,7 +61,7 @@ impl Document {
             taken_in: (part.body, part.repair()),
             misshapen: (check_shape(&loaded.inputs.part).err()).map(|e| e.to_string()),
             march: March::over(&loaded.inputs.part),
-            scratch: Scratch::default(),
+            scratch: MarchScratch::default(),
             part: loaded.inputs.part,
             repairs: loaded.repairs,
             path,
@@ -152,18 +152,18 @@ impl Document {
 
     /// The state on disk, as far as is known.
     #[must_use]
-    pub fn saved(&self) -> &State {
+    pub fn saved(&self) -> &DocumentState {
         &self.saved
     }
 
     /// What is on disk is not this state but that one.
-    pub fn compare_with(&mut self, saved: State) {
+    pub fn compare_with(&mut self, saved: DocumentState) {
         self.saved = saved;
     }
 
     /// What lies on disk now is this state, in a project and with a mesh at these paths. The name of the mesh
     /// belongs to no step of undo.
-    pub fn saved_as(&mut self, path: PathBuf, mesh: PathBuf, saved: State) {
+    pub fn saved_as(&mut self, path: PathBuf, mesh: PathBuf, saved: DocumentState) {
         let name = &saved.project.part.mesh;
         self.state.project.part.mesh.clone_from(name);
         self.settled.project.part.mesh.clone_from(name);

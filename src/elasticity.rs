@@ -31,7 +31,7 @@ pub mod system;
 
 pub use error::ElasticError;
 pub use load::{NodalForces, Push, Touch};
-pub use material::{Material, Section};
+pub use material::{Material, ShellSection};
 pub use model::Model;
 pub use shell::ShellModel;
 pub use support::{DofSet, Support};

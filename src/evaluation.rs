@@ -14,9 +14,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use self::judging::{EstimatorKind, Forces, Judging};
+pub use self::judging::{EstimatorKind, Judging, JudgingForces};
 pub use self::matched::{Matched, MatchedRow};
-pub use self::rows::{EVERYWHERE, EvaluationRow, JudgedSet, TouchRegion};
+pub use self::rows::{EVERYWHERE, EvaluationRow, JudgedSet, NamedRegion};
 pub use self::set_id::{Chooser, SetId};
 
 use self::failures::{FailureRow, FailureTrial, MOST_FAILED, failures};
@@ -25,11 +25,11 @@ use crate::dataset::{Signal, SignalMatrix};
 use crate::draw::normal;
 use crate::placement::SelectorKind;
 use crate::regression::folds::evenly;
-use crate::regression::tune::{self, CrossValidation, Effort, Grid, distances};
+use crate::regression::tune::{self, CrossValidation, Effort, TuningGrid, distances};
 use crate::regression::{Grouping, Hyper, PositionModel, scale};
 
 /// Training on one model, judging on another: nothing here has seen the test touches.
-pub struct Trial<'a> {
+pub struct EvaluationTrial<'a> {
     /// What the sites report.
     pub signal: Signal,
     /// Signals of the sites of interest under the training touches (sites × touches).
@@ -43,7 +43,7 @@ pub struct Trial<'a> {
     /// Where the test touches were (mm).
     pub test_targets: &'a [[f64; 3]],
     /// Regions of the test touches that errors are quoted for.
-    pub regions: &'a [TouchRegion],
+    pub regions: &'a [NamedRegion],
     /// Standard deviation of the noise added to training and test strain, and the numbers of the streams it
     /// is drawn from, one a site: the same stream gives the same noise in every trial.
     pub noise: f64,
@@ -114,7 +114,7 @@ pub struct Failures {
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn evaluate(
-    trial: &Trial,
+    trial: &EvaluationTrial,
     sets: &[Candidate],
     budget: &Budget,
     watch: Watch,
@@ -144,7 +144,7 @@ pub fn evaluate(
 /// Failures of each selector's last set; the baseline of all candidates is none.
 fn fail(
     noisy: &Noisy,
-    trial: &Trial,
+    trial: &EvaluationTrial,
     sets: &[Candidate],
     hypers: &[Hyper],
     budget: &Budget,
@@ -197,7 +197,7 @@ struct Noisy<'a> {
 }
 
 impl<'a> Noisy<'a> {
-    fn new(trial: &Trial<'a>) -> Self {
+    fn new(trial: &EvaluationTrial<'a>) -> Self {
         let noise = if trial.signal == Signal::Strain {
             trial.noise
         } else {
@@ -246,7 +246,7 @@ pub(crate) fn add_noise_by<'a>(
 
 fn tune_sets(
     noisy: &Noisy,
-    trial: &Trial,
+    trial: &EvaluationTrial,
     sets: &[Candidate],
     budget: &Budget,
     watch: Watch,
@@ -259,7 +259,7 @@ fn tune_sets(
         grouping: Grouping::Touch,
         effort: tuning_effort(budget, trial),
     };
-    let grid = Grid::default().scaled(scale::decade(trial.train_targets));
+    let grid = TuningGrid::default().scaled(scale::decade(trial.train_targets));
     let columns = evenly(trial.train_targets.len(), budget.tuning_touches);
     let targets: Vec<[f64; 3]> = columns.iter().map(|&c| trial.train_targets[c]).collect();
     let mut hypers: Vec<Hyper> = Vec::with_capacity(sets.len());
@@ -294,7 +294,7 @@ fn tune_sets(
 }
 
 /// A search needs the order of the settings, not their last digit.
-fn tuning_effort(budget: &Budget, trial: &Trial) -> Effort {
+fn tuning_effort(budget: &Budget, trial: &EvaluationTrial) -> Effort {
     let effort = Effort {
         tolerance: budget.svr_tolerance_mm.max(0.1),
         max_steps: budget.svr_steps.min(200_000),
@@ -304,7 +304,7 @@ fn tuning_effort(budget: &Budget, trial: &Trial) -> Effort {
 
 fn judge(
     noisy: &Noisy,
-    trial: &Trial,
+    trial: &EvaluationTrial,
     set: &Candidate,
     hyper: &Hyper,
     budget: &Budget,
@@ -331,7 +331,7 @@ fn judge(
 impl Evaluation {
     /// The same errors, quoted for other regions of the same test touches.
     #[must_use]
-    pub fn in_regions(&self, regions: &[TouchRegion]) -> Self {
+    pub fn in_regions(&self, regions: &[NamedRegion]) -> Self {
         let (sets, found) = (self.sets.iter(), self.found.iter());
         Self {
             rows: sets.flat_map(|set| set.rows(regions)).collect(),
@@ -345,7 +345,7 @@ impl Evaluation {
     pub(crate) fn of_matched(
         judging: Judging,
         found: Vec<Matched>,
-        regions: &[TouchRegion],
+        regions: &[NamedRegion],
     ) -> Self {
         let middle = judging.middle_n();
         let in_middle = found.iter().filter(|m| Some(m.force_n) == middle);

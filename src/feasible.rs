@@ -130,14 +130,14 @@ impl Feasibility {
 
 /// What lies behind and before sites, one value a site.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Surroundings {
+pub struct SiteSurroundings {
     /// Whether a site is on the back of a wall that touches come to.
     pub behind: Vec<bool>,
     /// Radius of the largest pad that can be brought there (m).
     pub room: Vec<f64>,
 }
 
-impl Surroundings {
+impl SiteSurroundings {
     /// Whether nothing can be brought to any site: what is closed is glued before it is closed.
     #[must_use]
     pub fn are_closed(&self) -> bool {
@@ -169,7 +169,7 @@ pub struct FeasibleInput<'a> {
     /// What the sites report.
     pub sites: &'a [Site],
     /// What lies before and behind the sites of a solid; absent for a shell, which is all wall.
-    pub surroundings: Option<&'a Surroundings>,
+    pub surroundings: Option<&'a SiteSurroundings>,
     /// One value a site: whether a jig gets to it; absent where that is not asked.
     pub jig: Option<&'a [bool]>,
     /// One value a site: in the painted region or not; absent when nothing was painted.
@@ -181,7 +181,7 @@ pub struct FeasibleInput<'a> {
 /// Applies all filters.
 #[must_use]
 pub fn feasible(input: &FeasibleInput, rules: &FeasibleRules) -> Feasibility {
-    Filters::new(input, rules).verdicts()
+    SiteFilters::new(input, rules).verdicts()
 }
 
 /// How far each vertex of a mesh is from anything held, over the surface (m).
@@ -202,7 +202,7 @@ pub fn feasible_beside(
     let off_centre = (input.sites.iter())
         .map(|site| off_centre_of(sites, site.gauge.position, rules.edge_neighbours))
         .collect();
-    let filters = Filters {
+    let filters = SiteFilters {
         clearance: Cow::Borrowed(clearance),
         off_centre,
         input,
@@ -232,7 +232,7 @@ pub fn blame(
     feasibility: &Feasibility,
     more: usize,
 ) -> Option<Blame> {
-    let filters = Filters::new(input, rules);
+    let filters = SiteFilters::new(input, rules);
     let of = |filter: Filter| {
         let taken: Vec<usize> = feasibility.taken_by(filter).collect();
         let alone: Vec<usize> = (taken.iter().copied())
@@ -251,7 +251,7 @@ pub fn blame(
 }
 
 /// The filters with what they look at.
-struct Filters<'a> {
+struct SiteFilters<'a> {
     input: &'a FeasibleInput<'a>,
     rules: &'a FeasibleRules,
     /// From anything held, over the surface (m), a vertex of the mesh.
@@ -260,7 +260,7 @@ struct Filters<'a> {
     off_centre: Vec<f64>,
 }
 
-impl<'a> Filters<'a> {
+impl<'a> SiteFilters<'a> {
     fn new(input: &'a FeasibleInput<'a>, rules: &'a FeasibleRules) -> Self {
         Self {
             clearance: Cow::Owned(clearance(input.mesh, input.supported)),

@@ -222,13 +222,13 @@ const SEARCHED: usize = 500;
 
 /// Signals that kernels are tried on: parts of the sites are left out and predicted from the others under every
 /// touch (signals standardized over all).
-struct Tried<'a> {
+struct TriedSignals<'a> {
     distances: &'a Distances,
     used: Vec<usize>,
     gram: Mat<f64>,
 }
 
-impl<'a> Tried<'a> {
+impl<'a> TriedSignals<'a> {
     fn new(x: &SignalMatrix, distances: &'a Distances) -> Self {
         let used: Vec<usize> = crate::regression::folds::evenly(x.rows(), SEARCHED);
         let scale = x.values().iter().fold(0.0f64, |m, v| m.max(v.abs()));
@@ -283,7 +283,7 @@ impl<'a> Tried<'a> {
 /// error is no number.
 #[must_use]
 pub fn trial(x: &SignalMatrix, distances: &Distances, kernel: &GpKernel) -> GpTrial {
-    Tried::new(x, distances).with(kernel)
+    TriedSignals::new(x, distances).with(kernel)
 }
 
 /// Cross-validated grid search. Returns the map, by rising length and power. Where the best length is the first or the
@@ -300,7 +300,7 @@ pub fn search(
     /// Lengths tried at once, each longer or shorter than the one before by this ratio.
     const MORE: i32 = 3;
     const RATIO: f64 = 1.5;
-    let tried = Tried::new(x, distances);
+    let tried = TriedSignals::new(x, distances);
     let mut map = tried.all(&LENGTHS_M, noise, watch)?;
     let [least, most] = distances.meaningful();
     while let (Some(best), Some(first), Some(last)) = (best(&map), map.first(), map.last()) {

@@ -16,10 +16,10 @@ use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
 
-pub use sift::{GivenSite, LeftOut, Sifted, Table, sift};
+pub use sift::{GivenSite, GivenTable, LeftOutRow, Sifted, sift};
 
 /// What the model answers.
-pub struct Answer {
+pub struct GivenAnswer {
     /// The factored model.
     pub model: Box<dyn Model>,
     responses: Responses,
@@ -37,7 +37,7 @@ pub struct Answer {
 
 /// One touch read at one site, on the inside face.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair {
+pub struct GivenPair {
     /// Rows of what was given.
     pub touch: usize,
     /// Row of the site in what was given.
@@ -63,7 +63,7 @@ pub fn answer(
     sites: &[GivenSite],
     budget: &Budget,
     watch: Watch,
-) -> Result<Answer, DesignError> {
+) -> Result<GivenAnswer, DesignError> {
     inputs.project.check()?;
     let mut rows = sift(&inputs.part, touches, sites);
     rows.refuse_any()?;
@@ -84,7 +84,7 @@ pub fn answer_sifted(
     mut rows: Sifted,
     budget: &Budget,
     watch: Watch,
-) -> Result<Answer, DesignError> {
+) -> Result<GivenAnswer, DesignError> {
     inputs.project.check()?;
     rows.check()?;
     // Solved, read out row by row, and written as text: several times the numbers themselves.
@@ -133,7 +133,7 @@ pub fn answer_sifted(
     notes.extend(pressed_on_supports(&held, &rows));
     let reading = Quantity::GaugeAndDisplacement(&angles);
     let responses = respond(&*model, &touches, &observer, reading, watch)?;
-    Ok(Answer {
+    Ok(GivenAnswer {
         model,
         responses,
         rows,
@@ -164,8 +164,8 @@ fn observed(model: &dyn Model, sites: &[GivenSite], rows: &mut Sifted) -> (Obser
     for (row, angle) in tried.into_iter().zip(projected) {
         match angle {
             Ok(_) => rows.sites.push(row),
-            Err(angle_deg) => rows.left_out.push(LeftOut {
-                table: Table::Sites,
+            Err(angle_deg) => rows.left_out.push(LeftOutRow {
+                table: GivenTable::Sites,
                 row,
                 why: DesignError::AcrossTheWall {
                     number: row,
@@ -190,9 +190,9 @@ fn angle_within(direction: DVec3, frame: &SiteFrame) -> Result<f64, f64> {
     }
 }
 
-impl Answer {
+impl GivenAnswer {
     /// All pairs, touch by touch.
-    pub fn pairs(&self) -> impl Iterator<Item = Pair> + '_ {
+    pub fn pairs(&self) -> impl Iterator<Item = GivenPair> + '_ {
         let Sifted { touches, sites, .. } = &self.rows;
         let rows: Vec<Vec<f64>> = (0..self.responses.rows())
             .map(|r| {
@@ -205,7 +205,7 @@ impl Answer {
         (0..touches.len() * count).map(move |k| {
             let (touch, site) = (k / count, k % count);
             let u = |c: usize| rows[count + 3 * site + c][touch];
-            Pair {
+            GivenPair {
                 touch: touches[touch],
                 site: sites[site],
                 displacement: DVec3::new(u(0), u(1), u(2)),

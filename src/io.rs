@@ -83,7 +83,7 @@ impl Default for ProcessMeter {
     }
 }
 
-impl crate::trade::Meter for ProcessMeter {
+impl crate::trade::CostMeter for ProcessMeter {
     fn cpu_seconds(&self) -> f64 {
         cpu_seconds()
     }

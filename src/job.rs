@@ -26,7 +26,7 @@ pub enum Stop {
 }
 
 #[derive(Default)]
-struct Shared {
+struct JobShared {
     cancel: AtomicBool,
     progress: Mutex<Option<Progress>>,
 }
@@ -34,7 +34,7 @@ struct Shared {
 /// Handed to the job's function: where it reports and learns that it should stop.
 #[derive(Clone)]
 pub struct Reporter {
-    shared: Arc<Shared>,
+    shared: Arc<JobShared>,
     wake: Arc<dyn Fn() + Send + Sync>,
 }
 
@@ -56,7 +56,7 @@ impl Reporter {
 /// A running job and the way to its result.
 pub struct Job<T> {
     pub name: String,
-    shared: Arc<Shared>,
+    shared: Arc<JobShared>,
     result: Receiver<Outcome<T>>,
     started: Instant,
 }
@@ -69,7 +69,7 @@ impl<T: Send + 'static> Job<T> {
         wake: impl Fn() + Send + Sync + 'static,
         work: impl FnOnce(&Reporter) -> Result<T, Stop> + Send + 'static,
     ) -> Self {
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(JobShared::default());
         let reporter = Reporter {
             shared: Arc::clone(&shared),
             wake: Arc::new(wake),

@@ -27,10 +27,10 @@ pub mod train;
 pub mod update;
 mod walk;
 
-pub use estimator::{Answer, TouchEstimator};
+pub use estimator::{Estimate, TouchEstimator};
 pub use family::{ByModel, Family, Method};
-pub use lessons::{LearningError, Lessons};
+pub use lessons::{LearningError, MeasuredTouches};
 pub use score::Scores;
 pub use still::Still;
-pub use train::{Trained, TrainingRequest, train};
+pub use train::{TrainedEstimator, TrainingRequest, train};
 pub use update::{Updated, update};

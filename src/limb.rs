@@ -17,7 +17,7 @@ mod grid;
 mod lattice;
 mod spec;
 
-use self::grid::Grid;
+use self::grid::LimbGrid;
 
 pub use self::spec::{BoxMm, LimbError, LimbSpec, LimbSupport};
 
@@ -40,7 +40,7 @@ impl LimbSpec {
     /// [`LimbError`] where the parameters do not describe a limb.
     pub fn build(&self) -> Result<(TriMesh, Vec<BoxMm>), LimbError> {
         self.check()?;
-        let mut grid = Grid::new(self);
+        let mut grid = LimbGrid::new(self);
         grid.round_corners(self.corner_radius);
         let positions: Vec<DVec3> = grid.nodes.iter().map(|&p| self.bend(p)).collect();
         // Building through the same checks as any file: a generator is no exception.

@@ -22,7 +22,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 pub use benching::{BY_HAND, BenchOrder, press_at_ports, press_simulated};
-pub use held::Held;
+pub use held::HeldConnection;
 pub use host::{Doorway, Entrance, Hosted, host};
 #[cfg(feature = "mcap")]
 pub use mcap_log::McapLog;
@@ -31,8 +31,8 @@ pub use ports::{PortInfo, ports};
 pub use pressed::{BenchPress, bench_presses};
 pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
-pub use session::{Connection, Listener, ListenerCommand, SessionEvent, State, Timing};
-pub use table::{Table, write_table};
+pub use session::{Connection, ConnectionState, Listener, ListenerCommand, SessionEvent, Timing};
+pub use table::{SampleTable, write_table};
 pub use truths::Truths;
 
 /// Where a board is found.
@@ -98,9 +98,9 @@ impl Address {
     ///
     /// # Errors
     /// As [`Self::check`].
-    pub fn hold(&self) -> Result<Option<Held>, String> {
+    pub fn hold(&self) -> Result<Option<HeldConnection>, String> {
         match self {
-            Self::Socket(address) => Held::new(socket::connect(address)?).map(Some),
+            Self::Socket(address) => HeldConnection::new(socket::connect(address)?).map(Some),
             Self::Serial { .. } | Self::Recording { .. } => self.check().map(|()| None),
         }
     }

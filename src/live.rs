@@ -19,9 +19,9 @@ mod update;
 
 pub use blind::LIGHT_N;
 pub use health::Health;
-pub use news::News;
+pub use news::RestNews;
 pub use pipeline::Pipeline;
 pub use presses::{FinishedPress, Presses};
 pub use receiver::{Input, Receiver, Sample, Traffic, Unusable};
 pub use tare::Rest;
-pub use update::{GaugeModel, Guess, PipelineSettings, ShownEstimator, Update};
+pub use update::{GaugeModel, Guess, LiveUpdate, PipelineSettings, ShownEstimator};

@@ -10,5 +10,5 @@ mod text;
 
 pub use flow::Flow;
 pub use pdf::pdf;
-pub use sheet::{Align, Format, Ink, Item, Line, Sheet, Words};
-pub use text::{Face, width_mm, wrapped};
+pub use sheet::{Align, Ink, Item, PlacedWords, Sheet, SheetLine, SheetSize};
+pub use text::{Typeface, width_mm, wrapped};

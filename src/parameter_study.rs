@@ -11,12 +11,12 @@ mod points;
 mod script;
 mod sobol;
 
-pub use self::axis::{Axis, Subject};
+pub use self::axis::{StudyAxis, Subject};
 pub use self::figures::{Figure, figures};
-pub use self::file::{Base, Combine, ParameterStudy};
+pub use self::file::{Combine, ParameterStudy, StudyBase};
 pub use self::front::{Aim, Bound, front};
 pub use self::points::{MOST_UNITS, Points};
-pub use self::script::{Engine, Job, Script};
+pub use self::script::{Engine, JobScript, UnitLimits};
 
 /// Parses a study's text and checks what can be known without its base.
 ///

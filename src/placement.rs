@@ -21,7 +21,7 @@ use crate::pca::PcaError;
 use crate::plain;
 pub use constraints::{Constraints, LostBy};
 pub use expected_error::Certificate;
-pub use selector::{Request, Selector};
+pub use selector::{SelectionRequest, Selector};
 
 /// The selectors a project can name.
 #[derive(

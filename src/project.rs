@@ -22,21 +22,21 @@ use std::f64::consts::PI;
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::Signal;
-use crate::elasticity::{Material, Section};
-use crate::evaluation::{EstimatorKind, Forces, Judging};
+use crate::elasticity::{Material, ShellSection};
+use crate::evaluation::{EstimatorKind, Judging, JudgingForces};
 use crate::feasible::FeasibleRules;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
-use crate::uncertainty::{Gluing, Making, Pressing, Uncertainty};
+use crate::uncertainty::{Gluing, HandPressing, Making, Uncertainty};
 
 use value::{MICRO, MM, is_default};
 
 pub use axis::PartAxis;
 pub use gauge::{CalibrationKeys, GaugeKeys, ToleranceKeys};
 pub use judging::{BudgetKeys, CandidateKeys, EvaluationKeys, RegionKeys};
-pub use kept::{Kept, KeptError, KeptFailure};
-pub use key::{Key, Range, Span};
+pub use kept::{KeptError, KeptFailure, KeptSelection};
+pub use key::{Key, Span, ValueRange};
 pub use keys::KeyTable;
 pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
@@ -44,7 +44,7 @@ pub use part::{ElementKind, MaterialKeys, Part, PartModel, SupportKeys, SupportK
 pub use ranges::FARTHEST;
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
 pub use tables::{Heading, all_keys};
-pub use touch::{FeasibleKeys, Lattice, SiteKeys, TouchKeys};
+pub use touch::{FeasibleKeys, SiteKeys, SiteLattice, TouchKeys};
 pub use value::{BadValue, Value};
 
 /// Version of the file format this program writes and the newest it reads.
@@ -97,7 +97,7 @@ pub struct Project {
     pub live: LiveKeys,
     /// Selections that were kept to be compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub kept: Vec<Kept>,
+    pub kept: Vec<KeptSelection>,
 }
 
 impl Project {
@@ -139,8 +139,8 @@ impl Project {
 
     /// Material and thickness of a shell.
     #[must_use]
-    pub fn section(&self) -> Section {
-        Section {
+    pub fn section(&self) -> ShellSection {
+        ShellSection {
             material: Material {
                 youngs_modulus: self.material.youngs_modulus_gpa * 1e9,
                 poissons_ratio: self.material.poissons_ratio,
@@ -230,8 +230,8 @@ impl Project {
 
     /// How a hand makes known presses.
     #[must_use]
-    pub fn pressing(&self) -> Pressing {
-        Pressing {
+    pub fn pressing(&self) -> HandPressing {
+        HandPressing {
             place: self.calibration.place_mm * MM,
             force: self.calibration.force_percent / 100.0,
             friction: self.calibration.friction_percent / 100.0,
@@ -275,7 +275,7 @@ impl Project {
         }
         let judged_n = self.evaluation.forces_n.clone();
         let hardest = judged_n.iter().copied().fold(0.0, f64::max);
-        Judging::Matching(Forces {
+        Judging::Matching(JudgingForces {
             most_n: self.live.largest_force_n.max(2.0 * hardest),
             judged_n,
         })

@@ -13,5 +13,5 @@ pub mod tune;
 
 pub use features::Standardizer;
 pub use places::Grouping;
-pub use svr::{Fit, SvrParams};
+pub use svr::{SvrFit, SvrParams};
 pub use tune::{Hyper, PositionModel};

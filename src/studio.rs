@@ -53,23 +53,23 @@ use egui::{CentralPanel, Context, Panel, ViewportCommand};
 use crate::document::Document;
 use crate::io::project_file::LoadedProject;
 use crate::render::gpu;
-use crate::session::{Attention, Colours, Event, FieldKind, Session, Wake};
+use crate::session::{Attention, Colours, FieldKind, Happening, Session, Wake};
 use action::WindowAction;
 use ask::Ask;
 use dialogs::Dialog;
 use layout::Panels;
-use paint::Look;
-use scene::Scene;
+use paint::LimbLook;
+use scene::PartScene;
 
 pub use crate::session::Standing;
 pub use commands::UiCommand;
 pub use display::last_words;
 pub use run::run;
-pub use view::{Field, Pane, Section, Stage, Tab, Tool, View, Way};
+pub use view::{Field, Pane, ScreenWay, SectionPlane, Stage, Tab, Tool, ViewState};
 
 /// What is kept between runs.
 #[derive(Default)]
-struct Kept {
+struct KeptSettings {
     recovery: Option<recovery::Recovery>,
     recent: recent::Recent,
 }
@@ -89,10 +89,10 @@ struct Frame {
 /// The application.
 pub struct Studio {
     pub session: Session,
-    pub view: View,
-    scene: Scene,
+    pub view: ViewState,
+    scene: PartScene,
     panels: Panels,
-    kept: Kept,
+    kept: KeptSettings,
     frame: Frame,
 }
 
@@ -122,11 +122,11 @@ impl Studio {
     /// The window around a session that nobody has looked at yet.
     fn around(session: Session) -> Self {
         Self {
-            view: View::of(&session.document),
-            scene: Scene::of(&session.document, &session.shape),
+            view: ViewState::of(&session.document),
+            scene: PartScene::of(&session.document, &session.shape),
             session,
             panels: Panels::default(),
-            kept: Kept::default(),
+            kept: KeptSettings::default(),
             frame: Frame::default(),
         }
     }
@@ -231,19 +231,21 @@ impl Studio {
     fn follow(&mut self) {
         for event in self.session.news.take_events() {
             match event {
-                Event::Opened { file, recovered } => self.show_opened(file.as_deref(), recovered),
-                Event::Saved(file) => self.remember(&file),
-                Event::Kept(name) => {
+                Happening::Opened { file, recovered } => {
+                    self.show_opened(file.as_deref(), recovered);
+                }
+                Happening::Saved(file) => self.remember(&file),
+                Happening::Kept(name) => {
                     self.view.shown_kept.insert(name);
                     self.view.tab = Tab::Compare;
                 }
-                Event::Designed => self.view.tab = Tab::Error,
-                Event::GaugesReplaced => self.view.picked.clear(),
-                Event::GaugeFound(number) => {
+                Happening::Designed => self.view.tab = Tab::Error,
+                Happening::GaugesReplaced => self.view.picked.clear(),
+                Happening::GaugeFound(number) => {
                     self.view.take(Tool::Gauges);
                     self.view.picked = vec![number];
                 }
-                Event::Connected => self.view.tab = Tab::Live,
+                Happening::Connected => self.view.tab = Tab::Live,
             }
         }
     }
@@ -251,12 +253,12 @@ impl Studio {
     /// Another project is open: nothing that is shown or asked of the one before stays.
     fn show_opened(&mut self, file: Option<&Path>, recovered: bool) {
         let (stage, tab) = (self.view.stage, self.view.tab);
-        self.view = View {
+        self.view = ViewState {
             stage,
             tab,
-            ..View::of(&self.session.document)
+            ..ViewState::of(&self.session.document)
         };
-        self.scene = Scene::of(&self.session.document, &self.session.shape);
+        self.scene = PartScene::of(&self.session.document, &self.session.shape);
         self.frame = Frame::default();
         self.panels.dialogs = dialogs::Dialogs::default();
         self.panels.live.record_to.clear();
@@ -272,7 +274,7 @@ impl Studio {
     fn asking<T>(
         &mut self,
         ctx: &Context,
-        panel: impl FnOnce(&mut Ask<'_>, &mut Scene, &mut Panels, &Kept) -> T,
+        panel: impl FnOnce(&mut Ask<'_>, &mut PartScene, &mut Panels, &KeptSettings) -> T,
     ) -> T {
         let mut ask = Ask::new(&self.session, &mut self.view);
         let answer = panel(&mut ask, &mut self.scene, &mut self.panels, &self.kept);
@@ -391,8 +393,8 @@ impl Studio {
     }
 
     /// All that a picture is made of.
-    fn look(&self) -> Look<'_> {
-        Look {
+    fn look(&self) -> LimbLook<'_> {
+        LimbLook {
             session: &self.session,
             view: &self.view,
             scene: &self.scene,

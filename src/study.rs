@@ -11,7 +11,7 @@ use crate::budget::Watch;
 use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
 use crate::gaussian_process::GpKernel;
-use crate::placement::expected_error::{Detail, Forces, Knowledge, Variance};
+use crate::placement::expected_error::{Detail, SceneForces, SignalKnowledge, Variance};
 use crate::placement::greedy_svr::GreedySvr;
 use crate::placement::{Constraints, PlacementError, Pool, Selection, SelectorKind};
 use crate::plain;
@@ -20,9 +20,9 @@ use crate::regression::places::clumps;
 use crate::regression::{Grouping, Standardizer};
 use crate::statistics::median;
 
-pub use self::choice::{Choice, ChoiceSeconds, Weighed, audit, select};
+pub use self::choice::{Choice, ChoiceSeconds, WeighedErrors, audit, select};
 pub use self::judge::evaluate;
-pub use self::question::{Estimator, HeldOut, Question, Verdict};
+pub use self::question::{Estimator, HeldOut, StudyQuestion, StudyVerdict};
 
 /// Signals of sites under touches.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,19 +67,19 @@ fn knowledge<'a>(
     noise: f64,
     seed: u64,
     variance: Variance<'a>,
-) -> Knowledge<'a> {
+) -> SignalKnowledge<'a> {
     /// The hardest that is thought possible, over the hardest that comes.
     const POSSIBLE: f64 = 2.0;
     let hardest = forces.iter().copied().fold(0.0, f64::max);
     let forces = usual_forces(forces).map(|usual| {
         let coming = coming.unwrap_or(usual);
-        Forces {
+        SceneForces {
             touches: forces,
             coming,
             possible: POSSIBLE * coming[1].max(hardest),
         }
     });
-    Knowledge {
+    SignalKnowledge {
         noise,
         variance: Some(variance),
         shared: None,

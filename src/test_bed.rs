@@ -1,6 +1,6 @@
 //! A run of the test-bed: what is asked for, made ready from a project, and gone on with where it was left.
 //!
-//! A [`Run`] is cheap: it says whether a folder can be begun in, or gone on with. What is pressed takes the model of the
+//! A [`PressingRun`] is cheap: it says whether a folder can be begun in, or gone on with. What is pressed takes the model of the
 //! gauges ([`Ready`]); a [`Collector`](crate::bench::Collector) then goes through it at real ports ([`Ready::press_at`]) or
 //! on a simulated bench ([`press_on_simulated`]).
 
@@ -14,8 +14,8 @@ mod run;
 mod simulated;
 
 pub use asked::{BenchRequest, Flaws};
-pub use dataset::{Collected, Wanted};
+pub use dataset::{CollectedRun, Wanted};
 pub use ready::{Ready, pressed};
-pub use rounds::{Errors, Goal, Met, Round};
-pub use run::Run;
+pub use rounds::{Met, PressErrors, Round, RunGoal};
+pub use run::PressingRun;
 pub use simulated::press_on_simulated;

@@ -1,7 +1,7 @@
 //! Speed against accuracy, measured: the whole pipeline at many settings, all judged by one model that is finer
 //! than any of theirs, and what each setting's knobs buy.
 //!
-//! A [`Setting`] says how much is spent at every stage. [`measure`] runs it and asks the judge; [`Sweep`] says
+//! A [`TradeSetting`] says how much is spent at every stage. [`measure`] runs it and asks the judge; [`Sweep`] says
 //! which setting is worth measuring next; [`front`] keeps those that no other beats; [`knobs`] says what a step
 //! of each knob costs and buys.
 
@@ -19,7 +19,7 @@ use crate::project::BadValue;
 
 pub use self::front::{TradeConstraint, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
-pub use self::setting::Setting;
+pub use self::setting::TradeSetting;
 pub use self::spent::{Knob, Spent};
 pub use self::sweep::{Sweep, standards};
 
@@ -87,14 +87,14 @@ impl From<&StageTime> for StageSeconds {
 
 /// A setting and what came of it; a message where it cannot be computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Point {
+pub struct TradePoint {
     /// The setting.
-    pub setting: Setting,
+    pub setting: TradeSetting,
     /// What it costs and achieves, or why it cannot be computed.
     pub outcome: Result<Measured, String>,
 }
 
-impl Point {
+impl TradePoint {
     /// What was measured, where it could be.
     #[must_use]
     pub fn measured(&self) -> Option<&Measured> {
@@ -103,7 +103,7 @@ impl Point {
 }
 
 /// Clock and memory, which the core does not have of its own.
-pub trait Meter: Sync {
+pub trait CostMeter: Sync {
     /// CPU time (s) of this process so far.
     fn cpu_seconds(&self) -> f64;
     /// Seconds by the clock since any fixed moment.
@@ -120,17 +120,17 @@ pub trait Meter: Sync {
 /// [`DesignError`] only for a stop; what cannot be computed at this setting is its outcome.
 pub fn measure(
     inputs: &Inputs,
-    setting: &Setting,
+    setting: &TradeSetting,
     judge: &Finest,
-    meter: &dyn Meter,
+    meter: &dyn CostMeter,
     watch: Watch,
-) -> Result<Point, DesignError> {
+) -> Result<TradePoint, DesignError> {
     let outcome = match attempt(inputs, setting, judge, meter, watch) {
         Ok(measured) => Ok(measured),
         Err(error) if error.is_cancelled() => return Err(error),
         Err(error) => Err(error.to_string()),
     };
-    Ok(Point {
+    Ok(TradePoint {
         setting: *setting,
         outcome,
     })
@@ -138,9 +138,9 @@ pub fn measure(
 
 fn attempt(
     inputs: &Inputs,
-    setting: &Setting,
+    setting: &TradeSetting,
     judge: &Finest,
-    meter: &dyn Meter,
+    meter: &dyn CostMeter,
     watch: Watch,
 ) -> Result<Measured, DesignError> {
     let mut inputs = setting.part(inputs)?;

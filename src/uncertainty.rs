@@ -78,7 +78,7 @@ impl Gluing {
 
 /// How far off a hand presses where and as hard as it was asked to (standard deviations).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Pressing {
+pub struct HandPressing {
     /// Rms distance from the place that was asked for (m), in any direction along the surface.
     pub place: f64,
     /// Of the force, as a share of what was asked for.
@@ -87,7 +87,7 @@ pub struct Pressing {
     pub friction: f64,
 }
 
-impl Default for Pressing {
+impl Default for HandPressing {
     /// A hand with a force gauge, at a mark on the part: 1 mm and 3 %, and six degrees off the upright.
     fn default() -> Self {
         Self {
@@ -134,7 +134,7 @@ fn tidy(value: f64) -> f64 {
     (value * 100.0).round() / 100.0
 }
 
-impl Pressing {
+impl HandPressing {
     /// A machine: just there, and just as hard.
     pub const EXACT: Self = Self {
         place: 0.0,
@@ -188,7 +188,7 @@ pub struct Uncertainty {
     /// Of what all channels have drifted by together since the rest (strain).
     pub drift: f64,
     /// How known presses are made.
-    pub pressing: Pressing,
+    pub pressing: HandPressing,
 }
 
 impl Default for Uncertainty {
@@ -205,7 +205,7 @@ impl Default for Uncertainty {
             making: Making::EXACT,
             allowed: 0.0,
             drift: 0.0,
-            pressing: Pressing::default(),
+            pressing: HandPressing::default(),
         }
     }
 }
@@ -223,7 +223,7 @@ impl Uncertainty {
         making: Making::EXACT,
         allowed: 0.0,
         drift: 0.0,
-        pressing: Pressing::EXACT,
+        pressing: HandPressing::EXACT,
     };
 
     /// With what the elements are estimated to leave, in percent of the strain; not a number where that is not known. No less
@@ -360,7 +360,7 @@ mod tests {
     fn the_usual_workshop_in_words() {
         let words = Gluing::default().in_words();
         assert_eq!(words, "1 mm and 3° off and its gain off by 3 %");
-        let words = Pressing::default().in_words();
+        let words = HandPressing::default().in_words();
         assert_eq!(
             words,
             "1 mm beside its place, 3 % too hard or too soft, and with 10 % of its force along the surface"
@@ -431,7 +431,7 @@ mod tests {
         };
         assert!(off.builds_as(&noisier));
         let pressed = Uncertainty {
-            pressing: Pressing::EXACT,
+            pressing: HandPressing::EXACT,
             ..off
         };
         assert!(!off.builds_as(&pressed));

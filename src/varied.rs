@@ -4,6 +4,6 @@ mod base;
 mod collected;
 mod limb_options;
 
-pub use base::Base;
-pub use collected::{Collected, Row};
-pub use limb_options::{LimbOptions, Made, Pattern, made};
+pub use base::UnitBase;
+pub use collected::{CollectedUnits, UnitRow};
+pub use limb_options::{LimbOptions, MadeLimb, Pattern, made};

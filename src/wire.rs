@@ -5,7 +5,7 @@
 mod frame;
 mod lines;
 
-pub use frame::{Decoder, Event, Hello, Message, Refusal, encode};
+pub use frame::{Decoded, Decoder, Hello, Refusal, WireMessage, encode};
 pub use lines::{LineReader, TextLine};
 
 /// Version of the protocol.

@@ -11,9 +11,9 @@ mod robot;
 mod solids;
 mod wiring;
 
-pub use inner::{Glued, Inner};
+pub use inner::{GluedGauge, Inner};
 pub use jigged::jig_of;
-pub use landmarks::{Landmarks, Neighbour, landmarks};
+pub use landmarks::{Landmarks, NearbyGauge, landmarks};
 pub use patch::Patch;
 pub use robot::{frame, roll_pitch_yaw, turn_of, urdf};
 pub use solids::{arrow, plate};

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use hapdef::budget::{Budget, unwatched};
 use hapdef::dataset;
-use hapdef::design::{self, DesignError, Inputs, Reduced, Reference, Simulated};
+use hapdef::design::{self, DesignError, Inputs, ReducedSites, Reference, Simulated};
 use hapdef::evaluation::{Chooser, EVERYWHERE, EstimatorKind, Evaluation, EvaluationRow};
 use hapdef::feasible::Feasibility;
 use hapdef::placement::{Selection, SelectorKind};
@@ -18,7 +18,7 @@ pub struct Displaced {
     pub budget: Budget,
     pub simulated: Simulated,
     pub feasibility: Feasibility,
-    pub reduced: Reduced,
+    pub reduced: ReducedSites,
     /// By the paper's selectors: sets of `SIZES`.
     pub selections: Vec<Selection>,
 }

@@ -13,7 +13,7 @@ use hapdef::placement::entropy::Entropy;
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
 use hapdef::placement::{
-    Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind,
+    Constraints, PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind,
 };
 
 use crate::displaced::{Displaced, Judged, of_sizes, row};
@@ -118,7 +118,7 @@ fn arc(a: DVec3, b: DVec3) -> f64 {
 /// What entropy and mutual information choose; nothing of one that the covariance leaves undefined.
 fn chosen(geometry: &Geometry, pool: &Pool) -> Result<Vec<Selection>, PlacementError> {
     let constraints = Constraints::count(MANY);
-    let request = Request {
+    let request = SelectionRequest {
         constraints: &constraints,
         watch: &unwatched,
         found: &|_| (),

@@ -9,7 +9,7 @@ use super::press::SampleMean;
 /// What the limb answers at a place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Answer {
+pub struct CheckedForce {
     /// Where the tip first felt it, before the place as planned (m).
     pub early: f64,
     /// Of each channel: counts a newton, or a millimetre of depth where the tip has no sensor.
@@ -20,19 +20,19 @@ pub struct Answer {
 
 /// Where it is checked, and how often.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reference {
+pub struct CheckPlace {
     /// The place.
     pub at: Planned,
     /// Presses between two checks.
     pub every: usize,
     /// What it answered at first, if that is known.
-    pub answer: Option<Answer>,
+    pub answer: Option<CheckedForce>,
 }
 
 /// How a run is checked.
 #[derive(Default)]
 pub(super) struct Check {
-    pub reference: Option<Reference>,
+    pub reference: Option<CheckPlace>,
     /// Whether what is pressed now is the reference.
     pub now: bool,
     /// Whether it was pressed since the run was begun, or the axes were found again.
@@ -54,7 +54,7 @@ pub(super) struct Check {
     pub homed: u32,
 }
 
-impl Answer {
+impl CheckedForce {
     /// Straight lines through what was read at depths (mm) or forces (N).
     fn fit(early: f64, steps: &[(f64, Option<f64>, Vec<f64>)], deviation: &[f64]) -> Option<Self> {
         /// Readings that make a line.
@@ -164,11 +164,11 @@ impl Check {
         &self,
         failed: Option<String>,
         gauges: impl Fn(usize) -> bool,
-    ) -> Result<Answer, String> {
+    ) -> Result<CheckedForce, String> {
         if let Some(why) = failed {
             return Err(why);
         }
-        let fit = Answer::fit(self.early, &self.steps, &self.deviation);
+        let fit = CheckedForce::fit(self.early, &self.steps, &self.deviation);
         let mut answer = fit.ok_or("too little was read there")?;
         for channel in (0..answer.slopes.len()).filter(|c| !gauges(*c)) {
             (answer.slopes[channel], answer.deviations[channel]) = (0.0, 0.0);
@@ -193,10 +193,10 @@ mod tests {
                 )
             })
             .collect();
-        let first = Answer::fit(1e-4, &steps, &[0.1, 0.1]).unwrap();
+        let first = CheckedForce::fit(1e-4, &steps, &[0.1, 0.1]).unwrap();
         assert!((first.slopes[0] - 40.0).abs() < 1e-9 && (first.slopes[1] + 20.0).abs() < 1e-9);
         assert_eq!(first.differs(&first, 2e-4), None);
-        let later = Answer {
+        let later = CheckedForce {
             early: -3e-4,
             ..first.clone()
         };
@@ -206,17 +206,17 @@ mod tests {
                 .unwrap()
                 .contains("0.40 mm later")
         );
-        let other = Answer {
+        let other = CheckedForce {
             slopes: vec![40.0, -23.0],
             ..first.clone()
         };
         assert!(other.differs(&first, 2e-4).unwrap().contains("by 7 %"));
         // Noise is no change.
-        let vague = Answer {
+        let vague = CheckedForce {
             deviations: vec![1.0, 1.0],
             ..other
         };
         assert_eq!(vague.differs(&first, 2e-4), None);
-        assert_eq!(Answer::fit(0.0, &steps[..2], &[0.1, 0.1]), None);
+        assert_eq!(CheckedForce::fit(0.0, &steps[..2], &[0.1, 0.1]), None);
     }
 }

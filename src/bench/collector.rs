@@ -9,15 +9,15 @@ mod watch;
 use std::collections::{BTreeSet, VecDeque};
 
 use self::motion::Motion;
-use super::check::{Answer, Check};
+use super::check::{Check, CheckedForce};
 use super::machine::Machine;
 use super::marlin::Marlin;
 use super::plan::Planned;
-use super::press::{Limits, SampleMean};
+use super::press::{PressLimits, SampleMean};
 
 /// What whoever drives it is told.
 #[derive(Clone, Debug, PartialEq)]
-pub enum News {
+pub enum CollectorNews {
     /// To be written down between the samples.
     Note(String),
     /// The sample that was given last belongs to a reading: it is to be written down.
@@ -32,7 +32,7 @@ pub enum News {
         failed: Option<String>,
     },
     /// What the limb answered where it is pressed again and again, when it was pressed there for the first time.
-    Answer(Answer),
+    Answer(CheckedForce),
     /// These presses that were over are none: they are made again.
     Discarded(Vec<usize>),
     /// All of the plan is pressed, and whether there is more is waited for.
@@ -43,7 +43,7 @@ pub enum News {
 
 /// How it ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Ended {
+pub enum RunEnd {
     /// All presses of the plan were tried.
     Finished,
     /// Something is wrong, and the tip was taken back if that was possible.
@@ -103,7 +103,7 @@ enum Doing {
 /// Goes through a plan.
 pub struct Collector {
     machine: Machine,
-    limits: Limits,
+    limits: PressLimits,
     marlin: Marlin,
     /// What is still to be pressed, with its numbers.
     plan: VecDeque<(usize, Planned)>,
@@ -140,7 +140,7 @@ pub struct Collector {
     /// Whether the end of the plan is not the end, and whether it is waited there.
     more: bool,
     waits: bool,
-    ended: Option<Ended>,
+    ended: Option<RunEnd>,
     /// Moves that were made and found to be right.
     pub moves: u64,
     /// The hardest that was felt (N).
@@ -152,7 +152,7 @@ impl Collector {
     #[must_use]
     pub fn new(
         machine: Machine,
-        limits: Limits,
+        limits: PressLimits,
         plan: impl IntoIterator<Item = (usize, Planned)>,
         retreat: f64,
     ) -> Self {
@@ -203,26 +203,26 @@ impl Collector {
         self.plan.extend(more);
         self.more = !self.plan.is_empty();
         if std::mem::take(&mut self.waits) && !self.more {
-            self.end(Ended::Finished);
+            self.end(RunEnd::Finished);
         }
     }
 
     /// Nothing of the plan is left.
-    fn through(&mut self, tell: &mut dyn FnMut(News)) {
+    fn through(&mut self, tell: &mut dyn FnMut(CollectorNews)) {
         if !self.more {
-            self.end(Ended::Finished);
+            self.end(RunEnd::Finished);
             return;
         }
         self.phase = Phase::Retract;
         self.doing = Doing::Nothing;
         if !std::mem::replace(&mut self.waits, true) {
-            tell(News::Waits);
+            tell(CollectorNews::Waits);
         }
     }
 
     /// How it ended, once it has.
     #[must_use]
-    pub fn ended(&self) -> Option<&Ended> {
+    pub fn ended(&self) -> Option<&RunEnd> {
         self.ended.as_ref()
     }
 
@@ -264,7 +264,7 @@ impl Collector {
     /// Cuts the machine's power to its motors, wherever it is. Nothing is taken back.
     pub fn kill(&mut self, out: &mut Vec<u8>) {
         Marlin::shout("M112", out);
-        self.end(Ended::Stopped(
+        self.end(RunEnd::Stopped(
             "the machine was told to halt (M112): reset it before the next run, and look where the tip is".into(),
         ));
     }
@@ -274,7 +274,7 @@ impl Collector {
         self.lose("the machine's port is gone", &mut Vec::new());
     }
 
-    fn end(&mut self, how: Ended) {
+    fn end(&mut self, how: RunEnd) {
         self.ended.get_or_insert(how);
         self.phase = Phase::Over;
         self.doing = Doing::Nothing;
@@ -299,7 +299,7 @@ impl Collector {
     /// It ends as it stands.
     fn give_up(&mut self) {
         let why = self.wrong.take().unwrap_or_default();
-        self.end(Ended::Stopped(why));
+        self.end(RunEnd::Stopped(why));
     }
 
     /// The machine cannot be believed any more: it is told to stop, and nothing is taken back.
@@ -307,7 +307,7 @@ impl Collector {
         Marlin::shout("M410", out);
         let before = self.wrong.take();
         let also = before.map_or(String::new(), |b| format!("{b}; and "));
-        self.end(Ended::Stopped(format!(
+        self.end(RunEnd::Stopped(format!(
             "{also}{why}. Look where the tip is before the next run"
         )));
     }

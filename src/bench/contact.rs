@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::machine::{Machine, Pose};
-use super::mount::Mount;
+use super::mount::TableMount;
 use crate::elasticity::{Push, Touch};
 use crate::mesh::TriMesh;
 
@@ -12,11 +12,11 @@ const FRICTION: f64 = 0.3;
 
 /// A tip against a limb that gives way in proportion to the force.
 #[derive(Clone, Debug)]
-pub struct Contact<'a> {
+pub struct ContactLaw<'a> {
     /// What the tip can touch.
     pub surface: &'a TriMesh,
     /// How the limb really stands.
-    pub mount: Mount,
+    pub mount: TableMount,
     /// The machine that moves the tip.
     pub machine: &'a Machine,
     /// How far tip, sensor and frame of the machine give way under a newton (m/N).
@@ -25,7 +25,7 @@ pub struct Contact<'a> {
     pub gives: Vec<(DVec3, f64)>,
 }
 
-impl Contact<'_> {
+impl ContactLaw<'_> {
     /// How the tip presses at a pose, if it does.
     #[must_use]
     pub fn push(&self, pose: &Pose) -> Option<Push> {

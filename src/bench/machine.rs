@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 /// One axis of a machine, and what its numbers mean.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct MachineAxis {
     /// Its letter in G-code.
     pub letter: char,
     /// Its number where what it moves stands at zero (mm, degrees).
@@ -17,7 +17,7 @@ pub struct Axis {
     pub speed: f64,
 }
 
-impl Axis {
+impl MachineAxis {
     /// Its number for a way (mm) or an angle (degrees).
     #[must_use]
     pub fn number(&self, way: f64) -> f64 {
@@ -54,13 +54,13 @@ pub struct Machine {
     /// For people.
     pub name: String,
     /// Of the tip's middle from the axis of the table.
-    pub radial: Axis,
+    pub radial: MachineAxis,
     /// Of the tip's middle along that axis.
-    pub along: Axis,
+    pub along: MachineAxis,
     /// What the table is turned by (degrees).
-    pub rotary: Axis,
+    pub rotary: MachineAxis,
     /// Of the tip to the side, where there is such an axis.
-    pub lateral: Option<Axis>,
+    pub lateral: Option<MachineAxis>,
     /// Of the tip (m).
     pub tip_radius: f64,
     /// What stays free between tip and limb while anything but the tip's approach moves (m).
@@ -162,7 +162,7 @@ impl Machine {
 
     /// The axes with their numbers at a pose; the tip's own way first.
     #[must_use]
-    pub fn numbers(&self, pose: &Pose) -> Vec<(&Axis, f64)> {
+    pub fn numbers(&self, pose: &Pose) -> Vec<(&MachineAxis, f64)> {
         let mut numbers = vec![
             (&self.radial, self.radial.number(pose.radial * 1e3)),
             (&self.along, self.along.number(pose.along * 1e3)),
@@ -176,8 +176,8 @@ impl Machine {
 
     /// The pose of such numbers: radial, along, rotary and, where there is one, lateral.
     #[must_use]
-    pub fn pose_of(&self, number: impl Fn(&Axis) -> f64) -> Pose {
-        let way = |axis: &Axis| axis.way(number(axis));
+    pub fn pose_of(&self, number: impl Fn(&MachineAxis) -> f64) -> Pose {
+        let way = |axis: &MachineAxis| axis.way(number(axis));
         Pose {
             radial: way(&self.radial) * 1e-3,
             along: way(&self.along) * 1e-3,
@@ -199,8 +199,8 @@ impl Machine {
 pub(super) mod tests {
     use super::*;
 
-    fn axis(letter: char, range: [f64; 2], speed: f64) -> Axis {
-        Axis {
+    fn axis(letter: char, range: [f64; 2], speed: f64) -> MachineAxis {
+        MachineAxis {
             letter,
             zero: 0.0,
             sign: 1.0,
@@ -213,7 +213,7 @@ pub(super) mod tests {
     pub fn paper() -> Machine {
         Machine {
             name: "Paper".into(),
-            radial: Axis {
+            radial: MachineAxis {
                 zero: 120.0,
                 sign: -1.0,
                 ..axis('X', [0.0, 119.0], 40.0)

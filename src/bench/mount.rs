@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// From the limb's coordinates to the table's (m): turned, then shifted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mount {
+pub struct TableMount {
     /// Of the limb.
     pub turn: DMat3,
     /// m.
@@ -14,7 +14,7 @@ pub struct Mount {
 
 /// A point that the tip has touched.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touched {
+pub struct TouchedPoint {
     /// On the limb (m).
     pub limb: DVec3,
     /// The limb's outward normal there.
@@ -23,7 +23,7 @@ pub struct Touched {
     pub tip: DVec3,
 }
 
-impl Mount {
+impl TableMount {
     /// The limb stands along the table's axis, its own `up` along the table's z, its front where the tip comes from at angle
     /// 0, and the middle of its axis over the table's.
     #[must_use]
@@ -60,7 +60,7 @@ impl Mount {
     ///
     /// # Errors
     /// Where the points do not say how the limb stands.
-    pub fn fit(touched: &[Touched], tip_radius: f64) -> Result<(Self, Vec<f64>), String> {
+    pub fn fit(touched: &[TouchedPoint], tip_radius: f64) -> Result<(Self, Vec<f64>), String> {
         /// Spread over the largest one, below which points lie on a line.
         const ON_A_LINE: f64 = 0.05;
         if touched.len() < 3 {
@@ -116,10 +116,10 @@ impl Mount {
 mod tests {
     use super::*;
 
-    fn touched(mount: &Mount, points: &[(DVec3, DVec3)]) -> Vec<Touched> {
+    fn touched(mount: &TableMount, points: &[(DVec3, DVec3)]) -> Vec<TouchedPoint> {
         points
             .iter()
-            .map(|&(limb, normal)| Touched {
+            .map(|&(limb, normal)| TouchedPoint {
                 limb,
                 normal,
                 tip: mount.place(limb + normal * 4e-3),
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_limb_that_stands_askew_is_found() {
-        let truth = Mount {
+        let truth = TableMount {
             turn: DMat3::from_rotation_x(0.1) * DMat3::from_rotation_z(2.0),
             shift: DVec3::new(3e-3, -2e-3, 40e-3),
         };
@@ -140,7 +140,7 @@ mod tests {
             (DVec3::new(0.0, -20e-3, 30e-3), DVec3::NEG_Y),
         ];
         let mut touched = touched(&truth, &points);
-        let (found, off) = Mount::fit(&touched, 4e-3).unwrap();
+        let (found, off) = TableMount::fit(&touched, 4e-3).unwrap();
         assert!((found.turn.x_axis - truth.turn.x_axis).length() < 1e-9);
         assert!((found.shift - truth.shift).length() < 1e-9);
         assert!(off.iter().all(|off| *off < 1e-9));
@@ -148,24 +148,24 @@ mod tests {
         assert!((found.limb(found.place(p)) - p).length() < 1e-12);
         // Mounted the wrong way round: what was touched does not fit.
         touched[0].tip = truth.place(DVec3::new(-20e-3, 0.0, 60e-3));
-        let (_, off) = Mount::fit(&touched, 4e-3).unwrap();
+        let (_, off) = TableMount::fit(&touched, 4e-3).unwrap();
         assert!(off.iter().any(|off| *off > 5e-3), "{off:?}");
     }
 
     #[test]
     fn points_that_say_too_little_are_refused() {
-        let here = Mount::upright(DVec3::Z, DVec3::X, DVec3::ZERO);
+        let here = TableMount::upright(DVec3::Z, DVec3::X, DVec3::ZERO);
         let line = touched(
             &here,
             &[1.0, 2.0, 3.0].map(|z| (DVec3::new(20e-3, 0.0, 30e-3 * z), DVec3::X)),
         );
-        assert!(Mount::fit(&line, 4e-3).is_err_and(|why| why.contains("line")));
-        assert!(Mount::fit(&line[..2], 4e-3).is_err_and(|why| why.contains("three")));
+        assert!(TableMount::fit(&line, 4e-3).is_err_and(|why| why.contains("line")));
+        assert!(TableMount::fit(&line[..2], 4e-3).is_err_and(|why| why.contains("three")));
     }
 
     #[test]
     fn a_limb_stands_upright_where_nothing_was_touched() {
-        let mount = Mount::upright(DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 3.0));
+        let mount = TableMount::upright(DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 3.0));
         assert!((mount.direction(DVec3::Y) - DVec3::Z).length() < 1e-12);
         assert!((mount.direction(DVec3::Z) - DVec3::X).length() < 1e-12);
         assert!((mount.place(DVec3::new(1.0, 7.0, 3.0)) - DVec3::Z * 7.0).length() < 1e-12);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::machine::{Machine, Pose};
-use super::mount::Mount;
+use super::mount::TableMount;
 use crate::mesh::TriMesh;
 
 /// A press that is planned.
@@ -38,7 +38,7 @@ pub fn plan(
     places: &[(DVec3, DVec3)],
     limb: &TriMesh,
     machine: &Machine,
-    mount: &Mount,
+    mount: &TableMount,
 ) -> Result<MachineReach, String> {
     let retreat = retreat(limb, machine, mount);
     let number = machine.radial.number(retreat * 1e3);
@@ -78,7 +78,7 @@ pub fn plan(
 }
 
 /// How far from the table's axis the tip's middle is clear of the limb, however the table turns.
-fn retreat(limb: &TriMesh, machine: &Machine, mount: &Mount) -> f64 {
+fn retreat(limb: &TriMesh, machine: &Machine, mount: &TableMount) -> f64 {
     let from_axis = |p: &DVec3| mount.place(*p).truncate().length();
     let farthest = limb.positions().iter().map(from_axis).fold(0.0, f64::max);
     farthest + machine.tip_radius + machine.clearance
@@ -88,7 +88,7 @@ fn retreat(limb: &TriMesh, machine: &Machine, mount: &Mount) -> f64 {
 fn in_the_way(
     limb: &TriMesh,
     machine: &Machine,
-    mount: &Mount,
+    mount: &TableMount,
     pose: &Pose,
     retreat: f64,
 ) -> Option<f64> {
@@ -120,7 +120,7 @@ mod tests {
         let (mesh, _) = LimbSpec::default().build().unwrap();
         let machine = paper();
         let (low, high) = mesh.bounds();
-        let mount = Mount::upright(DVec3::Z, DVec3::X, (low + high) / 2.0);
+        let mount = TableMount::upright(DVec3::Z, DVec3::X, (low + high) / 2.0);
         let places: Vec<(DVec3, DVec3)> = (sample::random(&mesh, 200, 3, |_| true).into_iter())
             .map(|at| (mesh.point(at), mesh.normal(at)))
             .collect();

@@ -2,7 +2,7 @@
 
 /// How far and how hard.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct PressLimits {
     /// Between two readings (m).
     pub step: f64,
     /// Of the tip into the limb, from where it was first felt (m).
@@ -23,7 +23,7 @@ pub struct Limits {
     pub read_us: u64,
 }
 
-impl Default for Limits {
+impl Default for PressLimits {
     /// As the paper's bench: 0.15 mm a step, to 2 mm or a force that its skin was pressed with.
     fn default() -> Self {
         Self {

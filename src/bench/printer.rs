@@ -24,7 +24,7 @@ pub struct PrinterFaults {
 
 /// One axis of it.
 #[derive(Clone, Copy, Debug)]
-struct Drive {
+struct DriveAxis {
     letter: char,
     /// Where it really is, and where it believes to be (mm, degrees).
     real: f64,
@@ -38,7 +38,7 @@ struct Drive {
 
 /// A printer without a port or a clock of its own.
 pub struct SimulatedPrinter {
-    drives: Vec<Drive>,
+    drives: Vec<DriveAxis>,
     faults: PrinterFaults,
     rng: ChaCha8Rng,
     open: Vec<u8>,
@@ -65,7 +65,7 @@ impl SimulatedPrinter {
         faults: PrinterFaults,
         seed: u64,
     ) -> Self {
-        let drive = |(letter, at)| Drive {
+        let drive = |(letter, at)| DriveAxis {
             letter,
             real: at,
             believed: at,

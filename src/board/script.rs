@@ -12,7 +12,7 @@ use crate::uncertainty::Making;
 
 /// One press: the force rises, stays and falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Press {
+pub struct ScriptedPress {
     /// When it begins, on the board's clock (s).
     pub start_s: f64,
     /// How long it lasts, rise and fall included (s).
@@ -52,9 +52,9 @@ pub struct GivenPress {
 
 /// Presses in the order of their time.
 #[derive(Clone, Debug)]
-pub enum Script {
+pub enum PressScript {
     /// These presses, once.
-    Given(Vec<Press>),
+    Given(Vec<ScriptedPress>),
     /// Places in the order given, again and again, with drawn forces and pauses.
     Random(Box<Random>),
     /// What a machine presses with just now, and how many pushes there were before it.
@@ -65,17 +65,17 @@ pub enum Script {
 #[derive(Clone, Debug)]
 pub struct Random {
     places: Vec<Touch>,
-    drawn: Drawn,
+    drawn: RandomPresses,
     rng: ChaCha8Rng,
     /// Of how presses are made: where and how hard they press is the same whatever that is.
     of_making: ChaCha8Rng,
     number: usize,
-    press: Press,
+    press: ScriptedPress,
 }
 
 /// What random presses are like.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drawn {
+pub struct RandomPresses {
     /// The smallest and the largest force (N).
     pub forces: [f64; 2],
     /// The shortest and the longest ramp (s), drawn evenly over the logarithm.
@@ -86,7 +86,7 @@ pub struct Drawn {
     pub making: Making,
 }
 
-impl Drawn {
+impl RandomPresses {
     /// Presses with forces between two (N), made as far off as is usual.
     #[must_use]
     pub fn usual(forces: [f64; 2], making: Making) -> Self {
@@ -106,15 +106,15 @@ const OF_MAKING: u64 = 0x3a8e;
 /// Seconds before anything is touched, so that there is time for a tare.
 const FIRST_S: f64 = 3.0;
 
-impl Script {
+impl PressScript {
     /// Presses at these places, one after the other.
     #[must_use]
-    pub fn random(places: Vec<Touch>, drawn: Drawn, seed: u64) -> Self {
+    pub fn random(places: Vec<Touch>, drawn: RandomPresses, seed: u64) -> Self {
         if places.is_empty() {
             return Self::Given(Vec::new());
         }
         let mut random = Random {
-            press: Press {
+            press: ScriptedPress {
                 start_s: 0.0,
                 duration_s: 0.0,
                 touch: places[0],
@@ -179,7 +179,7 @@ impl Random {
         let [low, high] = self.drawn.forces;
         let force = low + (high - low) * self.rng.random::<f64>();
         let duration_s = 0.6 + 0.8 * self.rng.random::<f64>();
-        self.press = Press {
+        self.press = ScriptedPress {
             start_s,
             duration_s,
             touch: Touch { force, ..place },
@@ -215,7 +215,7 @@ pub fn aside(normal: DVec3, up: DVec3, tilt_deg: f64, towards_deg: f64) -> DVec3
     (up * cosine + left * sine) * tilt_deg.to_radians().tan()
 }
 
-impl Press {
+impl ScriptedPress {
     /// The same as it comes to be made.
     fn made(self, making: &Making, rng: &mut ChaCha8Rng) -> Self {
         let push = made(&self.touch, making, rng);
@@ -266,8 +266,8 @@ mod tests {
         }
     }
 
-    fn press(start_s: f64, aside: DVec3) -> Press {
-        Press {
+    fn press(start_s: f64, aside: DVec3) -> ScriptedPress {
+        ScriptedPress {
             start_s,
             duration_s: 1.0,
             touch: touch(10.0),
@@ -278,8 +278,8 @@ mod tests {
 
     #[test]
     fn presses_that_overlap_are_on_together_with_their_own_ramps() {
-        let mut script = Script::Given(vec![press(0.0, DVec3::ZERO), press(0.5, DVec3::ZERO)]);
-        let on = |at: f64, script: &mut Script| -> Vec<usize> {
+        let mut script = PressScript::Given(vec![press(0.0, DVec3::ZERO), press(0.5, DVec3::ZERO)]);
+        let on = |at: f64, script: &mut PressScript| -> Vec<usize> {
             script.at(at).iter().map(|(number, _)| *number).collect()
         };
         assert_eq!(on(0.25, &mut script), [0]);
@@ -297,7 +297,7 @@ mod tests {
             let aside = aside(DVec3::X, DVec3::Z, 20.0, towards);
             let wanted = direction * 20.0_f64.to_radians().tan();
             assert!((aside - wanted).length() < 1e-12, "{aside}");
-            let mut script = Script::Given(vec![press(0.0, aside)]);
+            let mut script = PressScript::Given(vec![press(0.0, aside)]);
             let push = script.at(0.5)[0].1;
             let off = push.force.angle_between(DVec3::NEG_X).to_degrees();
             assert!((off - 20.0).abs() < 1e-9, "{off}");
@@ -310,13 +310,13 @@ mod tests {
 
     #[test]
     fn what_is_drawn_stays_within_what_was_asked() {
-        let drawn = Drawn {
+        let drawn = RandomPresses {
             forces: [2.0, 3.0],
             ramps: [0.002, 0.08],
             tilt_deg: 20.0,
             making: Making::EXACT,
         };
-        let mut script = Script::random(vec![touch(1.0)], drawn, 7);
+        let mut script = PressScript::random(vec![touch(1.0)], drawn, 7);
         let (mut most, mut seen) = (0.0_f64, 0);
         for k in 0..100_000 {
             for (_, push) in script.at(1e-3 * f64::from(k)) {
@@ -334,22 +334,27 @@ mod tests {
     #[test]
     fn presses_are_made_as_far_off_as_is_usual_and_no_others_are_drawn_for_it() {
         let drawn = |making: Making| {
-            let script = Script::random(vec![touch(1.0)], Drawn::usual([2.0, 8.0], making), 7);
-            let Script::Random(mut random) = script else {
+            let script = PressScript::random(
+                vec![touch(1.0)],
+                RandomPresses::usual([2.0, 8.0], making),
+                7,
+            );
+            let PressScript::Random(mut random) = script else {
                 panic!()
             };
             let presses = (0..4000).map(|k| {
                 random.draw(f64::from(k));
                 random.press
             });
-            presses.collect::<Vec<Press>>()
+            presses.collect::<Vec<ScriptedPress>>()
         };
         let exact = drawn(Making::EXACT);
         let off = drawn(Making {
             tip: 0.5e-3,
             friction: 0.2,
         });
-        let mean = |of: fn(&Press) -> f64| off.iter().map(of).sum::<f64>() / off.len() as f64;
+        let mean =
+            |of: fn(&ScriptedPress) -> f64| off.iter().map(of).sum::<f64>() / off.len() as f64;
         let friction = mean(|p| p.aside.length_squared()).sqrt();
         let tip = mean(|p| (p.touch.tip_radius - 5e-3).powi(2)).sqrt();
         assert!((friction - 0.2).abs() < 0.01, "{friction}");

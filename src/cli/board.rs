@@ -13,11 +13,13 @@ use anyhow::Context;
 use serde_json::json;
 
 pub use self::args::{BoardArgs, workshop};
-use self::plan::{Plan, on_surface};
+use self::plan::{BoardPlan, on_surface};
 use self::truth::TruthFile;
 use super::spared::Spared;
 use super::{out, progress::Bar};
-use crate::board::{Drawn, GivenPress, Options, Script, SimulatedBoard, Truth, script_seed};
+use crate::board::{
+    BoardOptions, GivenPress, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
+};
 use crate::budget::Watch;
 use crate::design::simulated_board::{options, places, simulated};
 use crate::design::{self, Inputs};
@@ -38,7 +40,7 @@ pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
     Spared::of(&loaded)
         .and("the script", args.script.as_deref())
         .check("--truth", args.truth.as_deref())?;
-    let plan = Plan::new(args, &loaded.inputs)?;
+    let plan = BoardPlan::new(args, &loaded.inputs)?;
     let (failed, failures) = channel();
     let mut truth = match &args.truth {
         Some(path) => Some(TruthFile::create(
@@ -83,7 +85,7 @@ enum Outlet {
 }
 
 impl Outlet {
-    fn open(args: &BoardArgs, plan: &Plan) -> anyhow::Result<Self> {
+    fn open(args: &BoardArgs, plan: &BoardPlan) -> anyhow::Result<Self> {
         let Some(path) = &args.record else {
             let entrance = doorway(args)?.open().map_err(anyhow::Error::msg)?;
             return Ok(Self::Door(entrance));
@@ -182,7 +184,7 @@ fn doorway(args: &BoardArgs) -> anyhow::Result<Doorway> {
 
 fn build(
     args: &BoardArgs,
-    plan: Plan,
+    plan: BoardPlan,
     inputs: &Inputs,
     watch: Watch,
 ) -> anyhow::Result<SimulatedBoard> {
@@ -190,9 +192,9 @@ fn build(
     let sensing = design::sensing(inputs, &inputs.project.budget.budget(), watch)?;
     let script = match &plan.presses {
         Some(presses) => on_surface(presses, inputs, &sensing),
-        None => Script::random(
+        None => PressScript::random(
             places(inputs, &sensing, seed)?,
-            Drawn {
+            RandomPresses {
                 forces: [args.force[0], args.force[1]],
                 ramps: [args.ramp[0] * 1e-3, args.ramp[1] * 1e-3],
                 tilt_deg: args.tilt,
@@ -203,7 +205,7 @@ fn build(
     };
     let hardest = strongest(&script).unwrap_or(args.force[1]);
     let usual = options(inputs, plan.channels);
-    let options = Options {
+    let options = BoardOptions {
         rate_hz: args.rate,
         noise: args.noise.unwrap_or(inputs.project.gauge.noise_microstrain) * 1e-6,
         drift: args.drift * 1e-6,
@@ -227,9 +229,9 @@ fn build(
     )?)
 }
 
-fn strongest(script: &Script) -> Option<f64> {
+fn strongest(script: &PressScript) -> Option<f64> {
     match script {
-        Script::Given(presses) => presses.iter().map(|p| p.touch.force).max_by(f64::total_cmp),
-        Script::Random(_) | Script::Held(..) => None,
+        PressScript::Given(presses) => presses.iter().map(|p| p.touch.force).max_by(f64::total_cmp),
+        PressScript::Random(_) | PressScript::Held(..) => None,
     }
 }

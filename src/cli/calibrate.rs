@@ -19,19 +19,19 @@ use super::spared::Spared;
 use super::{listen, out};
 use crate::design::{Sensing, check_reach};
 use crate::elasticity::Touch;
-use crate::inference::calibration::judged::{MISFIT, Outlook, misfits, outlook};
+use crate::inference::calibration::judged::{MISFIT, PressOutlook, misfits, outlook};
 use crate::inference::calibration::part::of_part;
 use crate::inference::{Calibration, KnownPress, calibrate};
 use crate::io::points::{AskedPoint, read_points};
 use crate::io::project_file::{self, LoadedProject};
-use crate::link::{Address, BAUD, Held, Listener, Pace, SessionEvent};
+use crate::link::{Address, BAUD, HeldConnection, Listener, Pace, SessionEvent};
 use crate::live::Pipeline;
 use crate::mesh::SurfacePoint;
-use crate::uncertainty::{Pressing, Uncertainty};
+use crate::uncertainty::{HandPressing, Uncertainty};
 
 use asked::AskedPresses;
 use part::{FittedPart, PartArg};
-use summary::{FoundOfPart, Row, Summary};
+use summary::{FoundOfPart, PressRow, Summary};
 
 /// A calibration needs as many presses at least.
 const LEAST: usize = 4;
@@ -133,10 +133,10 @@ fn fit_all(
     args: &CalibrateArgs,
     common: &Common,
     part: FittedPart,
-    rows: Vec<Row>,
+    rows: Vec<PressRow>,
     (noise, off): (&[f64], &Uncertainty),
 ) -> anyhow::Result<(FittedPart, Summary)> {
-    let used = |rows: &[Row]| rows.iter().filter(|r| r.used).count();
+    let used = |rows: &[PressRow]| rows.iter().filter(|r| r.used).count();
     let before = used(&rows);
     let mut part = part.fitted(&args.fit, common, &rows, noise, off)?;
     let mut found = fit((&part.sensing, &part.loaded), rows, (noise, off), args)?;
@@ -151,7 +151,7 @@ fn fit_all(
 }
 
 /// Refuses to calibrate with hardly any presses.
-fn check_count(rows: &[Row]) -> anyhow::Result<()> {
+fn check_count(rows: &[PressRow]) -> anyhow::Result<()> {
     let read = rows.iter().filter(|r| r.used).count();
     anyhow::ensure!(
         read >= LEAST,
@@ -182,7 +182,7 @@ fn off_with(loaded: &LoadedProject, sensing: &Sensing, machine: bool) -> Uncerta
         ..loaded.inputs.project.uncertainty()
     };
     if machine {
-        off.pressing = Pressing::EXACT;
+        off.pressing = HandPressing::EXACT;
     }
     off
 }
@@ -211,7 +211,7 @@ fn on_part(points: Vec<AskedPoint>, sensing: &Sensing, force: f64) -> Vec<AskedP
 
 /// One press after another, as they are made.
 fn read(
-    (address, held): (Address, Option<Held>),
+    (address, held): (Address, Option<HeldConnection>),
     loaded: &LoadedProject,
     sensing: &Sensing,
     points: Vec<AskedPoint>,
@@ -252,7 +252,7 @@ fn read(
 /// Fits the gauges to the presses that fit each other.
 fn fit(
     (sensing, loaded): (&Sensing, &LoadedProject),
-    mut rows: Vec<Row>,
+    mut rows: Vec<PressRow>,
     (noise, off): (&[f64], &Uncertainty),
     args: &CalibrateArgs,
 ) -> anyhow::Result<Summary> {
@@ -299,7 +299,7 @@ fn next(
     found: (&[KnownPress], &Calibration),
     uncertain: (&[f64], &Uncertainty),
     force: f64,
-) -> anyhow::Result<Outlook> {
+) -> anyhow::Result<PressOutlook> {
     const PLACES: usize = 96;
     let mesh = &sensing.drawn.map.mesh;
     let touches = sensing.touches(&loaded.inputs, PLACES, 0, true)?;

@@ -17,10 +17,10 @@ use super::listen::sensing_for;
 use super::out;
 use super::progress::Bar;
 use super::spared::Spared;
-use crate::bench::{Collector, Ended, News};
+use crate::bench::{Collector, CollectorNews, RunEnd};
 use crate::link::{Address, BenchOrder, Pace};
 use crate::plain;
-use crate::test_bed::{Goal, Met, Ready, Round, Run, press_on_simulated, pressed};
+use crate::test_bed::{Met, PressingRun, Ready, Round, RunGoal, press_on_simulated, pressed};
 
 /// Runs the command.
 ///
@@ -30,7 +30,7 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     let loaded = args.common.load()?;
     loaded.inputs.project.check()?;
     Spared::of(&loaded).check("--out", Some(&args.out))?;
-    let run = Run::new(args.asked(), &loaded.inputs, &args.out)?;
+    let run = PressingRun::new(args.asked(), &loaded.inputs, &args.out)?;
     let ports = ports(args)?;
     make_folder(&args.out)?;
     let sensing = Arc::new(sensing_for(&args.common, &loaded)?);
@@ -56,15 +56,15 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
             let collector = ready.collector_of_rounds(numbers);
             presser.press(&ready, collector, Some(&rounds))?
         }
-        Round::Over { .. } => Ended::Finished,
+        Round::Over { .. } => RunEnd::Finished,
     };
-    if let Ended::Stopped(_) = ended
+    if let RunEnd::Stopped(_) = ended
         && let Err(why) = args.common.in_pool(|| rounds.next())
     {
         out::say(&format!("hapdef: what was reached cannot be told: {why:#}"));
     }
     let learned = rounds.last();
-    if ended == Ended::Finished && learned.is_some_and(|(_, reached)| !reached) {
+    if ended == RunEnd::Finished && learned.is_some_and(|(_, reached)| !reached) {
         out::say("all places are pressed, and the goal is not reached");
     }
     finish(&ready, &presser, &ended, learned)
@@ -73,7 +73,7 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
 /// A plan that learns, and what has failed of it.
 struct Rounds<'a> {
     ready: &'a Ready,
-    goal: Goal,
+    goal: RunGoal,
     failed: Mutex<BTreeSet<usize>>,
     /// What was reached when it was looked at last, and whether that is the goal.
     last: Mutex<Option<(Met, bool)>>,
@@ -83,7 +83,7 @@ impl<'a> Rounds<'a> {
     fn new(ready: &'a Ready, args: &CollectArgs, mm: f64) -> Self {
         Self {
             ready,
-            goal: Goal {
+            goal: RunGoal {
                 mm,
                 round: args.round,
                 in_order: args.in_order,
@@ -196,38 +196,38 @@ impl<'a> Presser<'a> {
         ready: &Ready,
         mut collector: Collector,
         rounds: Option<&Rounds>,
-    ) -> anyhow::Result<Ended> {
+    ) -> anyhow::Result<RunEnd> {
         if collector.left() == 0 {
-            return Ok(Ended::Finished);
+            return Ok(RunEnd::Finished);
         }
         let all = ready.reach.presses.len();
         let mut done = ready.done.len();
         let mut failed = 0;
         // The collector waits for the next round.
         let waits = AtomicBool::new(false);
-        let tell = |news: News| match news {
-            News::Waits => waits.store(true, Ordering::Relaxed),
-            News::Say(text) => out::say(&format!("hapdef: {text}")),
-            News::Press { failed: None, .. } => {
+        let tell = |news: CollectorNews| match news {
+            CollectorNews::Waits => waits.store(true, Ordering::Relaxed),
+            CollectorNews::Say(text) => out::say(&format!("hapdef: {text}")),
+            CollectorNews::Press { failed: None, .. } => {
                 done += 1;
                 if done.is_multiple_of(10) || done == all {
                     out::say(&format!("{done} of {all} presses"));
                 }
             }
-            News::Press {
+            CollectorNews::Press {
                 number,
                 failed: Some(why),
             } => {
                 failed += 1;
                 out::say(&format!("press {number} failed: {why}"));
             }
-            News::Answer(_) => {
+            CollectorNews::Answer(_) => {
                 if let Err(error) = ready.keep(&news) {
                     out::say(&format!("hapdef: {error:#}"));
                 }
             }
-            News::Discarded(none) => done = done.saturating_sub(none.len()),
-            News::Note(_) | News::Keep | News::Begun(_) => {}
+            CollectorNews::Discarded(none) => done = done.saturating_sub(none.len()),
+            CollectorNews::Note(_) | CollectorNews::Keep | CollectorNews::Begun(_) => {}
         };
         let mut next = Next {
             rounds,
@@ -307,8 +307,8 @@ fn at_ports(
     ports: (&Address, &Address),
     inbox: &Receiver<BenchOrder>,
     next: &mut Next<'_>,
-    tell: impl FnMut(News),
-) -> anyhow::Result<Ended> {
+    tell: impl FnMut(CollectorNews),
+) -> anyhow::Result<RunEnd> {
     std::thread::scope(|scope| {
         let (answers, answered) = channel();
         let mut orders = || {
@@ -378,7 +378,7 @@ fn obey_stdin(orders: Sender<BenchOrder>) {
 fn finish(
     ready: &Ready,
     pressing: &Presser<'_>,
-    ended: &Ended,
+    ended: &RunEnd,
     learned: Option<(Met, bool)>,
 ) -> anyhow::Result<()> {
     let (presses, done) = (ready.reach.presses.len(), pressed(&ready.folder)?.len());
@@ -401,8 +401,8 @@ fn finish(
     }
     out::line(&said.to_string())?;
     match ended {
-        Ended::Finished => Ok(()),
-        Ended::Stopped(why) => anyhow::bail!(
+        RunEnd::Finished => Ok(()),
+        RunEnd::Stopped(why) => anyhow::bail!(
             "{why}. {done} of {presses} presses are kept; the same command goes on with the rest"
         ),
     }

@@ -70,17 +70,17 @@ fn said(given: GivenData) -> (Data, Vec<String>) {
 }
 
 /// What is never divided between learning and judging, as `--groups` says.
-pub enum Kept {
+pub enum KeptTogether {
     /// Repeats of a place, or what other flags say.
     Usual,
     /// Each touch by itself.
     Touch,
     /// What the user gave.
-    Given(Groups),
+    Given(TouchGroups),
 }
 
 /// Groups of touches that the user gave.
-pub struct Groups {
+pub struct TouchGroups {
     /// Numbered from zero without gaps.
     pub of_touches: Vec<usize>,
     /// The array or file that they are from.
@@ -93,19 +93,24 @@ impl DataArgs {
     ///
     /// # Errors
     /// A message for a name of nothing, and as [`dataset_file::groups`].
-    pub fn kept(&self, groups: Option<&str>, said: bool, touches: usize) -> anyhow::Result<Kept> {
+    pub fn kept(
+        &self,
+        groups: Option<&str>,
+        said: bool,
+        touches: usize,
+    ) -> anyhow::Result<KeptTogether> {
         /// Taken where nothing else is said.
         const USUAL: &str = "groups";
-        let read = |name: &str| -> anyhow::Result<Option<Groups>> {
+        let read = |name: &str| -> anyhow::Result<Option<TouchGroups>> {
             let found = dataset_file::groups(&self.data, name, touches)?;
-            Ok(found.map(|of_touches| Groups {
+            Ok(found.map(|of_touches| TouchGroups {
                 of_touches,
                 source: name.to_owned(),
             }))
         };
         let given = match groups {
             Some("place") => None,
-            Some("none") => return Ok(Kept::Touch),
+            Some("none") => return Ok(KeptTogether::Touch),
             Some(name) => Some(read(name)?.ok_or_else(|| {
                 misuse(
                     "--groups takes place, none, an array in an NPZ, or a CSV with a column group",
@@ -114,7 +119,7 @@ impl DataArgs {
             None if said || !dataset_file::holds(&self.data, USUAL)? => None,
             None => read(USUAL)?,
         };
-        Ok(given.map_or(Kept::Usual, Kept::Given))
+        Ok(given.map_or(KeptTogether::Usual, KeptTogether::Given))
     }
 }
 

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::out;
 use crate::io::outlet;
 use crate::plain;
-use crate::test_bed::{Collected, Wanted};
+use crate::test_bed::{CollectedRun, Wanted};
 
 #[derive(Args, Debug, Clone)]
 pub struct DatasetArgs {
@@ -53,12 +53,12 @@ pub fn run(args: &DatasetArgs) -> anyhow::Result<()> {
         all_depths: args.depths == DepthsArg::All,
         least_force: args.least_force,
     };
-    let Collected {
+    let CollectedRun {
         about,
         board,
         presses,
         columns,
-    } = Collected::read(&args.folder, wanted)?;
+    } = CollectedRun::read(&args.folder, wanted)?;
     columns.write_npz(&args.out, &about.limb, &board)?;
     if let Some(path) = &args.csv {
         columns.write_csv(path)?;

@@ -11,7 +11,7 @@ use crate::design::{self, Design};
 use crate::evaluation::{Chooser, EvaluationRow, MatchedRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
-use crate::paper::Format;
+use crate::paper::SheetSize;
 use crate::placement::{SelectorKind, SensorSet};
 use crate::plain;
 use crate::project::Project;
@@ -40,7 +40,7 @@ pub struct DesignArgs {
     pub no_workshop: bool,
     /// Sheets of report.pdf and template.pdf: a4 or letter.
     #[arg(long, default_value = "a4")]
-    pub sheet: Format,
+    pub sheet: SheetSize,
 }
 
 /// Runs the command.

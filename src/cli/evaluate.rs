@@ -3,7 +3,9 @@
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::data::{CriterionArgs, DataArgs, Groups, Kept, SplitArg, criterion_json, site_json};
+use super::data::{
+    CriterionArgs, DataArgs, KeptTogether, SplitArg, TouchGroups, criterion_json, site_json,
+};
 use super::out;
 use super::progress::Bar;
 use super::ranges::{between, misuse, whole};
@@ -11,11 +13,11 @@ use crate::io::cpu_seconds;
 use crate::placement::greedy_svr::GreedySvr;
 use crate::plain;
 use crate::regression::Grouping;
-use crate::study::{self, Data, Estimator, Verdict};
+use crate::study::{self, Data, Estimator, StudyVerdict};
 
 /// What turns readings into places.
 #[derive(ValueEnum, Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum EstimatorArg {
+pub enum RegressionArg {
     /// A support vector regression trained for each set.
     #[default]
     Svr,
@@ -25,12 +27,12 @@ pub enum EstimatorArg {
     Nearest,
 }
 
-impl From<EstimatorArg> for Estimator {
-    fn from(arg: EstimatorArg) -> Self {
+impl From<RegressionArg> for Estimator {
+    fn from(arg: RegressionArg) -> Self {
         match arg {
-            EstimatorArg::Svr => Self::Svr,
-            EstimatorArg::Matching => Self::Matching,
-            EstimatorArg::Nearest => Self::Nearest,
+            RegressionArg::Svr => Self::Svr,
+            RegressionArg::Matching => Self::Matching,
+            RegressionArg::Nearest => Self::Nearest,
         }
     }
 }
@@ -48,7 +50,7 @@ pub struct EvaluateArgs {
     /// touches by their force where `force_n` says it; `nearest` averages as many touches (1, 2, 4 or 8) as
     /// cross-validation finds best.
     #[arg(long, value_enum, default_value_t)]
-    pub estimator: EstimatorArg,
+    pub estimator: RegressionArg,
     /// Touches that are never divided between learning and judging: `place` (repeats of one place), `none` (each
     /// touch by itself), the name of an array of whole numbers in the NPZ, one a touch, or a CSV with a column
     /// `group` and a row a touch. An array `groups` in the NPZ is taken by itself.
@@ -80,7 +82,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let (data, mut notes) = args.data.load()?;
     let (svr, groups) = args.divided(&data)?;
     args.data.named(args.check_sites(&data))?;
-    let question = study::Question {
+    let question = study::StudyQuestion {
         sites: &args.sites,
         estimator: args.estimator.into(),
         groups: groups.as_ref().map(|g| &g.of_touches[..]),
@@ -99,8 +101,8 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         args.data.named(study::evaluate(&data, &question, &watch))
     });
     bar.finish();
-    let verdict: Verdict = result?;
-    let usual = (args.estimator == EstimatorArg::Svr && !args.tune)
+    let verdict: StudyVerdict = result?;
+    let usual = (args.estimator == RegressionArg::Svr && !args.tune)
         .then(|| args.criterion.paper_note())
         .flatten();
     if let Some(note) = &usual {
@@ -147,7 +149,7 @@ impl EvaluateArgs {
                 )));
             }
         }
-        if self.estimator == EstimatorArg::Svr {
+        if self.estimator == RegressionArg::Svr {
             return Ok(());
         }
         let idle = self.criterion.of_regression().into_iter();
@@ -183,24 +185,28 @@ impl EvaluateArgs {
     }
 
     /// The regression with what it keeps together, and the groups that the user gave instead.
-    fn divided(&self, data: &Data) -> anyhow::Result<(GreedySvr, Option<Groups>)> {
+    fn divided(&self, data: &Data) -> anyhow::Result<(GreedySvr, Option<TouchGroups>)> {
         let mut svr = self.criterion.criterion(&data.targets)?;
         let said = self.criterion.split == SplitArg::Touch || self.criterion.place_mm.is_some();
         let kept = (self.data).kept(self.groups.as_deref(), said, data.targets.len())?;
         let groups = match kept {
-            Kept::Usual => None,
-            Kept::Touch => {
+            KeptTogether::Usual => None,
+            KeptTogether::Touch => {
                 svr.grouping = Grouping::Touch;
                 None
             }
-            Kept::Given(groups) => Some(groups),
+            KeptTogether::Given(groups) => Some(groups),
         };
         Ok((svr, groups))
     }
 }
 
 /// What was used beside the data: of the regression only where one was trained.
-fn settings_json(question: &study::Question, data: &Data, groups: Option<&Groups>) -> Value {
+fn settings_json(
+    question: &study::StudyQuestion,
+    data: &Data,
+    groups: Option<&TouchGroups>,
+) -> Value {
     let mut used = if question.estimator == Estimator::Svr {
         criterion_json(question.svr)
     } else {
@@ -222,7 +228,7 @@ fn settings_json(question: &study::Question, data: &Data, groups: Option<&Groups
     used
 }
 
-fn print_table(verdict: &Verdict) -> anyhow::Result<()> {
+fn print_table(verdict: &StudyVerdict) -> anyhow::Result<()> {
     out::line("gauges  criterion  held out: mean  median     95 %  (mm)")?;
     for (error, criterion) in verdict.errors.iter().zip(&verdict.criteria_mm) {
         out::line(&format!(

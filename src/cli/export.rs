@@ -14,7 +14,7 @@ use super::spared::Spared;
 use crate::budget::unwatched;
 use crate::design::{Nearness, check_chosen};
 use crate::elasticity::Touch;
-use crate::io::handover::{Scene, link};
+use crate::io::handover::{StepScene, link};
 use crate::io::project_file::LoadedProject;
 use crate::io::run::Provenance;
 use crate::io::{atomic, outlet};
@@ -104,7 +104,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<()> {
 fn scene(args: &ExportArgs, loaded: &LoadedProject, inner: &Inner) -> anyhow::Result<Vec<u8>> {
     let keys = &loaded.inputs.project.gauge;
     let grid_mm = [keys.grid_length_mm, keys.grid_width_mm];
-    let still = Scene {
+    let still = StepScene {
         limb: &loaded.inputs.part,
         field: None,
         inner,
@@ -140,7 +140,7 @@ fn scene(args: &ExportArgs, loaded: &LoadedProject, inner: &Inner) -> anyhow::Re
     let positions: Vec<DVec3> = both.map(|(p, u)| *p + *u * args.exaggerate).collect();
     // The same triangles at other places: nothing is measured on them.
     let drawn = TriMesh::from_checked(positions, limb.triangles().to_vec());
-    Scene {
+    StepScene {
         limb: &drawn,
         field: Some(&field),
         inner: &gauges,

@@ -10,7 +10,7 @@ use super::common::make_folder;
 use super::out;
 use crate::design::Learned;
 use crate::io::touch_file;
-use crate::io::touch_source::{AGREES_MM, FILES, Source};
+use crate::io::touch_source::{AGREES_MM, EstimatorSource, FILES};
 use crate::learning::portable::Precision;
 use crate::plain;
 
@@ -73,7 +73,7 @@ pub fn run(args: &ExportCArgs) -> anyhow::Result<()> {
         "the estimator knows {touches} touches, and a board's table at most {MOST_TOUCHES}: train it on fewer (--train-touches)"
     );
     make_folder(&args.out)?;
-    let source = Source::new(estimator, args.precision.asked());
+    let source = EstimatorSource::new(estimator, args.precision.asked());
     let origin = &file.header.origin;
     let about = format!(
         "Touch from readings, by hapdef {}: {}, trained on {} touches of {}, {:.2} mm off on touches of no training.",

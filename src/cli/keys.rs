@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::out;
 use crate::plain::quote;
-use crate::project::{Key, Project, Range, all_keys};
+use crate::project::{Key, Project, ValueRange, all_keys};
 
 /// Every key with its unit, its range, its default and its meaning.
 #[derive(Args, Debug, Clone)]
@@ -33,7 +33,7 @@ pub fn run(args: &KeysArgs) -> anyhow::Result<()> {
         anyhow::bail!("no key has {part} in it. `hapdef keys` lists them all");
     }
     let text = if args.json {
-        let keys: Vec<_> = rows.iter().map(Row::json).collect();
+        let keys: Vec<_> = rows.iter().map(KeyRow::json).collect();
         json!({ "keys": keys }).to_string()
     } else if args.markdown {
         in_tables(&rows)
@@ -50,12 +50,12 @@ pub fn markdown() -> String {
 }
 
 /// A key with what stands for it where it is left out.
-struct Row {
+struct KeyRow {
     key: &'static Key,
     default: Option<toml::Value>,
 }
 
-fn rows(part: &str) -> Vec<Row> {
+fn rows(part: &str) -> Vec<KeyRow> {
     let mut defaults = BTreeMap::new();
     // Lists are empty, and what they would hold has no defaults.
     Project::around("", None).tables(&mut |_, table| {
@@ -66,23 +66,23 @@ fn rows(part: &str) -> Vec<Row> {
     });
     let named = all_keys().into_iter().filter(|key| key.path.contains(part));
     named
-        .map(|key| Row {
+        .map(|key| KeyRow {
             key,
             default: defaults.get(key.path).cloned().flatten(),
         })
         .collect()
 }
 
-impl Row {
+impl KeyRow {
     fn json(&self) -> serde_json::Value {
         let key = self.key;
         let (least, most) = match key.range {
-            Range::Numbers(span) => (json!(span.least()), json!(span.most())),
-            Range::Whole(least, most) => (json!(least), json!(most)),
-            Range::Words(_) | Range::Any(_) => (json!(null), json!(null)),
+            ValueRange::Numbers(span) => (json!(span.least()), json!(span.most())),
+            ValueRange::Whole(least, most) => (json!(least), json!(most)),
+            ValueRange::Words(_) | ValueRange::Any(_) => (json!(null), json!(null)),
         };
         let words = match key.range {
-            Range::Words(words) => json!(words),
+            ValueRange::Words(words) => json!(words),
             _ => json!(null),
         };
         json!({
@@ -105,7 +105,7 @@ impl Row {
 }
 
 /// For a terminal.
-fn in_lines(rows: &[Row]) -> String {
+fn in_lines(rows: &[KeyRow]) -> String {
     let mut text = String::new();
     for row in rows {
         let key = row.key;
@@ -127,7 +127,7 @@ fn in_lines(rows: &[Row]) -> String {
 }
 
 /// For the reference page: a table for each table of the file.
-fn in_tables(rows: &[Row]) -> String {
+fn in_tables(rows: &[KeyRow]) -> String {
     let mut text = String::new();
     let mut table = "";
     for row in rows {

@@ -11,7 +11,7 @@ use super::out;
 use crate::design::Inputs;
 use crate::io::{atomic, glb, project_file};
 use crate::project::{Masks, Project};
-use crate::varied::{LimbOptions, Made, made};
+use crate::varied::{LimbOptions, MadeLimb, made};
 
 /// Without options it writes the bundled limb, with `--pattern triangles` the other one.
 #[derive(Args, Debug, Clone)]
@@ -34,7 +34,7 @@ pub struct LimbArgs {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
-    let Made {
+    let MadeLimb {
         name,
         mesh,
         mut project,

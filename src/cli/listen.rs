@@ -26,9 +26,10 @@ use crate::io::run::Provenance;
 use crate::io::touch_file::{self, TouchFile};
 use crate::io::{handover, kept_model};
 use crate::link::{
-    Address, BAUD, Listener, ListenerCommand, Pace, Recorder, SessionEvent, State, Table,
+    Address, BAUD, ConnectionState, Listener, ListenerCommand, Pace, Recorder, SampleTable,
+    SessionEvent,
 };
-use crate::live::{Pipeline, Sample, ShownEstimator, Update};
+use crate::live::{LiveUpdate, Pipeline, Sample, ShownEstimator};
 use crate::plain;
 use crate::session::{train, training_touches};
 use crate::wire::Hello;
@@ -54,7 +55,7 @@ pub struct ListenArgs {
     /// What finds the touch: model matching, or a regression that is trained on touches of the model first. Of how many
     /// touch, and of all of them, matching speaks anyway.
     #[arg(long, default_value = "matching")]
-    pub estimator: EstimatorArg,
+    pub estimator: ListenEstimatorArg,
     /// An estimator that was learned from presses (.hapdtouch), as `hapdef train` writes it, finds the touch instead. One of
     /// another limb or another board is refused.
     #[arg(long, conflicts_with = "estimator")]
@@ -86,7 +87,7 @@ pub struct ListenArgs {
 
 /// What finds the touch.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EstimatorArg {
+pub enum ListenEstimatorArg {
     /// Model matching.
     Matching,
     /// The paper's regression, on the readings as they are.
@@ -95,12 +96,12 @@ pub enum EstimatorArg {
     Normalized,
 }
 
-impl From<EstimatorArg> for ShownEstimator {
-    fn from(value: EstimatorArg) -> Self {
+impl From<ListenEstimatorArg> for ShownEstimator {
+    fn from(value: ListenEstimatorArg) -> Self {
         match value {
-            EstimatorArg::Matching => Self::Matching,
-            EstimatorArg::Svr => Self::Raw,
-            EstimatorArg::Normalized => Self::Normalized,
+            ListenEstimatorArg::Matching => Self::Matching,
+            ListenEstimatorArg::Svr => Self::Raw,
+            ListenEstimatorArg::Normalized => Self::Normalized,
         }
     }
 }
@@ -245,7 +246,7 @@ fn pipeline(
     let gauges = sensing.gauges.len();
     let settings = project.live.settings(gauges);
     let mut pipeline = Pipeline::new(sensing.map_for(&project.live), settings);
-    if args.estimator != EstimatorArg::Matching {
+    if args.estimator != ListenEstimatorArg::Matching {
         let bar = Bar::default();
         let used = vec![true; gauges];
         let trained = args.common.in_pool(|| {
@@ -268,7 +269,7 @@ fn say(text: &str) {
 /// Where lines go.
 struct Output {
     stdout: BufWriter<std::io::Stdout>,
-    csv: Option<Table>,
+    csv: Option<SampleTable>,
     log: Option<Log>,
     served: Option<(TcpListener, Vec<Client>)>,
     /// For whoever is served.
@@ -292,7 +293,7 @@ impl Output {
             commands,
             log: None,
             served: args.serve.as_deref().map(serve).transpose()?,
-            csv: args.csv.as_deref().map(Table::create).transpose()?,
+            csv: args.csv.as_deref().map(SampleTable::create).transpose()?,
             stdout: BufWriter::new(std::io::stdout()),
             estimator: args.estimator.into(),
             period_us: args.every.map_or(0, |r| (1e6 / r) as u64),
@@ -364,7 +365,7 @@ impl Output {
         Ok(())
     }
 
-    fn row(&mut self, sample: &Sample, update: &Update) -> anyhow::Result<()> {
+    fn row(&mut self, sample: &Sample, update: &LiveUpdate) -> anyhow::Result<()> {
         let Some(csv) = &mut self.csv else {
             return Ok(());
         };
@@ -378,7 +379,7 @@ impl Output {
         Ok(())
     }
 
-    fn line(&mut self, update: &Update) -> anyhow::Result<()> {
+    fn line(&mut self, update: &LiveUpdate) -> anyhow::Result<()> {
         if self
             .last_us
             .is_some_and(|last| update.time_us.abs_diff(last) < self.period_us)
@@ -403,7 +404,7 @@ impl Output {
         out::printed(writeln!(self.stdout, "{line}"))
     }
 
-    fn log(&mut self, update: &Update) -> anyhow::Result<()> {
+    fn log(&mut self, update: &LiveUpdate) -> anyhow::Result<()> {
         let written = self.log.as_mut().map(|log| log.sample(update));
         written.transpose().map(drop).map_err(anyhow::Error::msg)
     }
@@ -421,13 +422,13 @@ impl Output {
     }
 }
 
-fn in_words(state: &State) -> &'static str {
+fn in_words(state: &ConnectionState) -> &'static str {
     match state {
-        State::Waiting => "waiting for the board",
-        State::Live => "live",
-        State::Silent => "the board has fallen silent",
-        State::Gone => "unplugged; waiting for the board to come back",
-        State::Ended => "the recording is over",
+        ConnectionState::Waiting => "waiting for the board",
+        ConnectionState::Live => "live",
+        ConnectionState::Silent => "the board has fallen silent",
+        ConnectionState::Gone => "unplugged; waiting for the board to come back",
+        ConnectionState::Ended => "the recording is over",
     }
 }
 

@@ -11,7 +11,7 @@ use super::{out, train};
 use crate::design::Learned;
 use crate::io::table::Writing;
 use crate::io::{atomic, touch_file};
-use crate::learning::{Answer, Scores, Still};
+use crate::learning::{Estimate, Scores, Still};
 
 #[derive(Args, Debug, Clone)]
 pub struct PredictArgs {
@@ -76,7 +76,7 @@ pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
     still.map_or(Ok(()), |still| out::line(&still.words(cure)))
 }
 
-fn table(answers: &[Answer]) -> String {
+fn table(answers: &[Estimate]) -> String {
     let forces = answers.iter().any(|a| a.force_n.is_some());
     let names = ["x_mm", "y_mm", "z_mm", "radius_mm", "force_n"];
     let mut table = Writing::new(names.into_iter().take(if forces { 5 } else { 4 }));

@@ -15,7 +15,7 @@ pub struct Bar {
     drawn: ProgressBar,
     stage: Mutex<&'static str>,
     /// Absent on a terminal.
-    lines: Option<Mutex<Lines>>,
+    lines: Option<Mutex<LogLines>>,
 }
 
 impl Default for Bar {
@@ -35,7 +35,7 @@ impl Default for Bar {
         Self {
             drawn: bar,
             stage: Mutex::new(""),
-            lines: (!terminal).then(|| Mutex::new(Lines::default())),
+            lines: (!terminal).then(|| Mutex::new(LogLines::default())),
         }
     }
 }
@@ -69,12 +69,12 @@ impl Bar {
 
 /// Which reports become lines of a log: the first of every stage, and of a long one some more.
 #[derive(Default)]
-struct Lines {
+struct LogLines {
     last: Option<(&'static str, Instant)>,
     seen: Vec<&'static str>,
 }
 
-impl Lines {
+impl LogLines {
     /// Between two lines of one stage, and before a stage that was there already speaks again.
     const PAUSE: Duration = Duration::from_secs(15);
 
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_line_for_each_stage_and_now_and_then_one_more() {
-        let mut lines = Lines::default();
+        let mut lines = LogLines::default();
         let start = Instant::now();
         let mut at = |stage, done, seconds| {
             let progress = Progress {

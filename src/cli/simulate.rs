@@ -143,7 +143,7 @@ fn at_points(
     if args.strict {
         rows.refuse_any().map_err(placed)?;
     }
-    let places = off::Places::of(touches_file, sites_file);
+    let places = off::RowPlaces::of(touches_file, sites_file);
     places.say_all(&rows);
     let said_before = rows.left_out.len();
     let budget = loaded.inputs.project.budget.budget();

@@ -10,12 +10,12 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use self::unit::Bench;
+use self::unit::Workbench;
 use super::out;
 use crate::io::study_folder::{StudyFolder, read_study};
 use crate::plain;
 
-pub use self::collect::CollectArgs;
+pub use self::collect::StudyCollectArgs;
 pub use self::run::RunArgs;
 pub use self::submit::SubmitArgs;
 
@@ -23,17 +23,17 @@ pub use self::submit::SubmitArgs;
 #[derive(Args, Debug, Clone)]
 pub struct StudyArgs {
     #[command(subcommand)]
-    pub step: Step,
+    pub step: StudyCommand,
 }
 
 #[derive(Subcommand, Debug, Clone)]
-pub enum Step {
+pub enum StudyCommand {
     /// Numbers the units of a study and writes them into a folder.
     Plan(PlanArgs),
     /// Computes units of a folder; any of them, anywhere, as often as wanted.
     Run(RunArgs),
     /// Makes tables and a report of what was computed so far.
-    Collect(CollectArgs),
+    Collect(StudyCollectArgs),
     /// Writes a job script for an engine that carries the units to machines, and says the command.
     Submit(SubmitArgs),
 }
@@ -56,10 +56,10 @@ pub struct PlanArgs {
 /// A message in the user's terms.
 pub fn run(args: &StudyArgs) -> anyhow::Result<()> {
     match &args.step {
-        Step::Plan(args) => plan(args),
-        Step::Run(args) => run::run(args),
-        Step::Collect(args) => collect::run(args),
-        Step::Submit(args) => submit::run(args),
+        StudyCommand::Plan(args) => plan(args),
+        StudyCommand::Run(args) => run::run(args),
+        StudyCommand::Collect(args) => collect::run(args),
+        StudyCommand::Submit(args) => submit::run(args),
     }
 }
 
@@ -67,7 +67,7 @@ fn plan(args: &PlanArgs) -> anyhow::Result<()> {
     let (study, _) = read_study(&args.study)?;
     let home = args.study.parent().unwrap_or(std::path::Path::new(""));
     // What no unit could use is found before anything is written.
-    let bench = Bench::new(&study, home)?;
+    let bench = Workbench::new(&study, home)?;
     bench.base.check_axes(&study)?;
     let (base, meshes) = (bench.base.fingerprint()?, bench.base.meshes(&study));
     let folder = StudyFolder::plan(&args.out, &args.study, base, meshes)?;

@@ -13,9 +13,9 @@ use crate::budget::Quality;
 use crate::design::Finest;
 use crate::io::project_file::LoadedProject;
 use crate::io::together::Together;
-use crate::io::trade_file::{self, Judge, Record};
+use crate::io::trade_file::{self, TradeJudge, TradeRecord};
 use crate::io::{ProcessMeter, project_file};
-use crate::trade::{Point, Sweep, TradeConstraint, answer, clock, front, measure};
+use crate::trade::{Sweep, TradeConstraint, TradePoint, answer, clock, front, measure};
 
 #[derive(Args, Debug, Clone)]
 pub struct TradeArgs {
@@ -81,10 +81,10 @@ pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
 }
 
 /// What was measured in a folder for the same inputs.
-fn known(folder: &Path, loaded: &LoadedProject, threads: usize) -> anyhow::Result<Record> {
+fn known(folder: &Path, loaded: &LoadedProject, threads: usize) -> anyhow::Result<TradeRecord> {
     let record = trade_file::read(folder)?;
     let Some(record) = record else {
-        return Ok(Record::new(&loaded.inputs, threads));
+        return Ok(TradeRecord::new(&loaded.inputs, threads));
     };
     anyhow::ensure!(
         record.is_of(&loaded.inputs),
@@ -105,13 +105,13 @@ fn sweep(
     args: &TradeArgs,
     loaded: &LoadedProject,
     place: &Together,
-    record: &mut Record,
+    record: &mut TradeRecord,
 ) -> anyhow::Result<()> {
     let project = &loaded.inputs.project;
     let qualities: Vec<Quality> = args.qualities.iter().map(|&q| q.into()).collect();
     let sweep = Sweep::new(project, qualities);
     let start = Instant::now();
-    let next = |points: &[Point]| {
+    let next = |points: &[TradePoint]| {
         let over = args
             .seconds
             .is_some_and(|s| start.elapsed().as_secs_f64() > s);
@@ -129,7 +129,7 @@ fn sweep(
     let watch = |p| -> ControlFlow<()> { bar.show(p) };
     out::say("laying the judge's elements");
     let judge = Finest::new(&loaded.inputs, &watch)?;
-    record.judge = Judge {
+    record.judge = TradeJudge {
         element_mm: judge.element_mm(),
         unknowns: judge.unknowns(),
         touches: judge.touches(),
@@ -148,7 +148,7 @@ fn sweep(
     Ok(())
 }
 
-fn say(number: usize, point: &Point) {
+fn say(number: usize, point: &TradePoint) {
     let words = point.setting.in_words();
     out::say(&match &point.outcome {
         Ok(m) => format!(
@@ -163,7 +163,7 @@ fn say(number: usize, point: &Point) {
 fn reply(
     args: &TradeArgs,
     loaded: &LoadedProject,
-    record: &Record,
+    record: &TradeRecord,
     asked: TradeConstraint,
 ) -> anyhow::Result<()> {
     let (TradeConstraint::Within(wish) | TradeConstraint::OfTheBest(wish)) = asked;

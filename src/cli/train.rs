@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::common::{Common, QualityArg};
-use super::data::{DataArgs, Kept};
+use super::data::{DataArgs, KeptTogether};
 use super::listen::sensing_for;
 use super::out;
 use super::progress::Bar;
@@ -14,16 +14,16 @@ use super::ranges::whole;
 use super::spared::Spared;
 use super::train_update;
 use crate::design::{
-    Candidates, Learned, Outcome, PressLessons, Sensing, TeachingError, train_all,
+    Learned, PressLessons, Sensing, TeachingError, TrainingOutcome, TrialMethods, train_all,
 };
 use crate::io::project_file::LoadedProject;
 use crate::io::{bench_folder, cpu_seconds, touch_file};
 use crate::learning::score::ForceRow;
-use crate::learning::{ByModel, Family, Lessons, Method, Scores, TrainingRequest};
+use crate::learning::{ByModel, Family, MeasuredTouches, Method, Scores, TrainingRequest};
 use crate::plain;
 use crate::regression::Grouping;
 use crate::study::{self, Data};
-use crate::uncertainty::Pressing;
+use crate::uncertainty::HandPressing;
 
 /// What turns readings into places.
 #[derive(ValueEnum, Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -133,7 +133,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         });
     }
     let before = cpu_seconds();
-    let lessons = Lessons {
+    let lessons = MeasuredTouches {
         x: &data.x,
         places_mm: &data.targets,
         forces: &data.forces,
@@ -146,10 +146,10 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     }
     notes.extend(trained.notes.iter().cloned());
     let name = args.data.data.file_name().unwrap_or_default();
-    let origin = touch_file::Origin {
+    let origin = touch_file::TrainingOrigin {
         limb: limb.or(bench_folder::key_in(&args.data.data, bench_folder::LIMB)?),
         board: bench_folder::key_in(&args.data.data, bench_folder::BOARD)?,
-        ..touch_file::Origin::of(&trained, &data, &name.to_string_lossy(), args.seed)
+        ..touch_file::TrainingOrigin::of(&trained, &data, &name.to_string_lossy(), args.seed)
     };
     touch_file::write(&args.out, origin, &trained.estimator)?;
     if args.json {
@@ -159,7 +159,10 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
 }
 
 /// What was learned, and the key of the limb where there is a model of it.
-fn trained(args: &TrainArgs, lessons: &Lessons) -> anyhow::Result<(Outcome, Option<String>)> {
+fn trained(
+    args: &TrainArgs,
+    lessons: &MeasuredTouches,
+) -> anyhow::Result<(TrainingOutcome, Option<String>)> {
     let method = args.estimator.method();
     let asked = TrainingRequest {
         family: match method {
@@ -190,7 +193,7 @@ fn trained(args: &TrainArgs, lessons: &Lessons) -> anyhow::Result<(Outcome, Opti
                 None
             }
         };
-        let candidates = Candidates {
+        let candidates = TrialMethods {
             regressions: !by_model,
             model: presses.as_ref().map(|presses| (presses, &ways[..])),
         };
@@ -208,24 +211,24 @@ fn trained(args: &TrainArgs, lessons: &Lessons) -> anyhow::Result<(Outcome, Opti
 }
 
 /// The part that was pressed, with its model.
-struct Part {
+struct TrainedPart {
     loaded: LoadedProject,
     sensing: Sensing,
     /// Its key.
     limb: String,
 }
 
-impl Part {
+impl TrainedPart {
     fn presses<'a>(
         &'a self,
-        lessons: &Lessons,
+        lessons: &MeasuredTouches,
         by_hand: bool,
     ) -> Result<PressLessons<'a>, TeachingError> {
         let project = &self.loaded.inputs.project;
         let pressing = if by_hand {
             project.uncertainty().pressing
         } else {
-            Pressing::EXACT
+            HandPressing::EXACT
         };
         PressLessons::new(&self.sensing, project, lessons, pressing)
     }
@@ -248,18 +251,18 @@ impl TrainArgs {
     fn groups(&self, data: &Data) -> anyhow::Result<(Vec<usize>, Option<String>)> {
         let kept = (self.data).kept(self.groups.as_deref(), false, data.targets.len())?;
         Ok(match kept {
-            Kept::Usual => {
+            KeptTogether::Usual => {
                 let words = study::clump_words(&data.targets);
                 let note = words.map(|words| format!("{words} (--groups none divides them)."));
                 (Grouping::Place.of(&data.targets), note)
             }
-            Kept::Touch => (Grouping::Touch.of(&data.targets), None),
-            Kept::Given(groups) => (groups.of_touches, None),
+            KeptTogether::Touch => (Grouping::Touch.of(&data.targets), None),
+            KeptTogether::Given(groups) => (groups.of_touches, None),
         })
     }
 
     /// The part of the project, where one is named and asked for.
-    fn part(&self, ways: &[ByModel], needed: bool) -> anyhow::Result<Option<Part>> {
+    fn part(&self, ways: &[ByModel], needed: bool) -> anyhow::Result<Option<TrainedPart>> {
         if ways.is_empty() {
             return Ok(None);
         }
@@ -287,7 +290,7 @@ impl TrainArgs {
             plain::path(&self.data.data)
         );
         let sensing = sensing_for(&common, &loaded)?;
-        Ok(Some(Part {
+        Ok(Some(TrainedPart {
             loaded,
             sensing,
             limb,
@@ -295,7 +298,7 @@ impl TrainArgs {
     }
 }
 
-fn json_of(trained: &Outcome, notes: &[String], cpu_seconds: f64) -> serde_json::Value {
+fn json_of(trained: &TrainingOutcome, notes: &[String], cpu_seconds: f64) -> serde_json::Value {
     let Scores {
         mean_mm,
         median_mm,
@@ -334,7 +337,7 @@ fn json_of(trained: &Outcome, notes: &[String], cpu_seconds: f64) -> serde_json:
     })
 }
 
-fn print(trained: &Outcome, cpu_seconds: f64) -> anyhow::Result<()> {
+fn print(trained: &TrainingOutcome, cpu_seconds: f64) -> anyhow::Result<()> {
     for trial in &trained.tried {
         out::line(&format!(
             "{:<18} {:>8.3} mm on the validation touches",

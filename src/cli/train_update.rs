@@ -8,9 +8,9 @@ use super::data::DataArgs;
 use super::out;
 use super::progress::Bar;
 use crate::design::Learned;
-use crate::io::touch_file::{self, Origin, Update};
+use crate::io::touch_file::{self, TrainingOrigin, UpdateSection};
 use crate::io::{bench_folder, cpu_seconds};
-use crate::learning::{Lessons, Still, Updated, update};
+use crate::learning::{MeasuredTouches, Still, Updated, update};
 use crate::plain;
 use crate::study::Data;
 
@@ -51,7 +51,7 @@ pub fn run(
     check_limb(origin, &args.data)?;
     let before = cpu_seconds();
     let bar = Bar::default();
-    let lessons = Lessons {
+    let lessons = MeasuredTouches {
         x: &data.x,
         places_mm: &data.targets,
         forces: &data.forces,
@@ -63,9 +63,9 @@ pub fn run(
     let found = found?;
     let answers = old.find(&data.x);
     let still = Still::of(&old.known_ratios(), &answers, &data.targets);
-    let new = Origin {
+    let new = TrainingOrigin {
         test: found.after.clone(),
-        update: Some(Update {
+        update: Some(UpdateSection {
             data: name(&args.data),
             fingerprint: asked.fingerprint.clone(),
             presses: data.targets.len(),
@@ -83,7 +83,7 @@ pub fn run(
 }
 
 /// Refuses presses of another limb, where both say which.
-fn check_limb(origin: &Origin, data: &Path) -> anyhow::Result<()> {
+fn check_limb(origin: &TrainingOrigin, data: &Path) -> anyhow::Result<()> {
     let here = bench_folder::key_in(data, bench_folder::LIMB)?;
     if let (Some(old), Some(new)) = (&origin.limb, here) {
         anyhow::ensure!(

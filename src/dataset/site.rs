@@ -38,7 +38,7 @@ pub(super) fn gauges_on(model: &dyn Model, gauges: &[Gauge]) -> (Observer, Vec<f
 
 /// Second moments over the touches of the mean strain a, and b, c of a + b cos 2φ + c sin 2φ.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Moments {
+pub(super) struct StrainMoments {
     pub(super) aa: f64,
     pub(super) bb: f64,
     pub(super) cc: f64,
@@ -48,7 +48,7 @@ pub(super) struct Moments {
     pub(super) peak: f64,
 }
 
-impl Moments {
+impl StrainMoments {
     pub(super) fn of(xx: &[f64], yy: &[f64], xy: &[f64]) -> Self {
         let mut m = Self::default();
         for k in 0..xx.len() {

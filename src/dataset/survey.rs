@@ -1,7 +1,7 @@
 //! Gauges anywhere on a part under the touches of a dataset: what they read where they are, and to first order beside it.
 
 use super::making::MakingSlopes;
-use super::site::{Moments, Site, gauges_on};
+use super::site::{Site, StrainMoments, gauges_on};
 use super::slopes::{self, GluingSlopes};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::Touch;
@@ -77,7 +77,7 @@ pub fn survey(
         let weights = along(angle);
         let along_it = |t: usize| (0..3).map(|k| weights[k] * rows[k][t]).sum();
         let mean = |t: usize| f64::midpoint(rows[0][t], rows[1][t]);
-        let moments = Moments::of(&rows[0], &rows[1], &rows[2]);
+        let moments = StrainMoments::of(&rows[0], &rows[1], &rows[2]);
         let site = moments.site(gauge.position, observer.frames()[i], angle, count);
         turned.extend(slopes::turned(&rows, angle, &columns));
         let x: Vec<f64> = columns.iter().map(|&t| along_it(t)).collect();

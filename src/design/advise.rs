@@ -17,7 +17,7 @@ use crate::elasticity::solid::sizing::PartMeasures;
 use crate::elasticity::{ElasticError, Touch, scope};
 use crate::mesh::TriMesh;
 use crate::mesh::sample;
-use crate::mesh::walls::Side;
+use crate::mesh::walls::WallSide;
 use crate::plain::{self, digits};
 use crate::project::PartModel;
 
@@ -57,7 +57,7 @@ pub struct Advice {
 #[derive(Clone, Debug)]
 pub struct Faces {
     /// The side of its wall that each vertex is on.
-    pub sides: Vec<Side>,
+    pub sides: Vec<WallSide>,
     /// m; zero where there is no wall.
     pub thickness: Vec<f64>,
 }
@@ -138,7 +138,7 @@ fn of_closed(
 ) -> Result<Advice, DesignError> {
     let whole = &solid.whole;
     let wall_mm = [0.1, 0.5, 0.9].map(|s| 1e3 * solid.walls.thinner_than(whole, s));
-    let is_face = |t: u32| solid.walls.sides[t as usize] != Side::Rim;
+    let is_face = |t: u32| solid.walls.sides[t as usize] != WallSide::Rim;
     let faces: Vec<u32> = (0..whole.triangles().len() as u32)
         .filter(|&t| is_face(t))
         .collect();

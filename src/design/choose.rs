@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::known::{KnownSimulation, detail};
-use super::reduce::{Located, Reduced, noisy_signals};
+use super::reduce::{Located, ReducedSites, noisy_signals};
 use super::{DesignError, Inputs, Simulated};
 use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
@@ -14,8 +14,8 @@ use crate::placement::greedy_svr::{self, GreedySvr};
 use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
 use crate::placement::{
-    Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet,
-    margin, pca_qr,
+    Constraints, PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind,
+    SensorSet, margin, pca_qr,
 };
 use crate::project::ElementKind;
 use crate::regression::Grouping;
@@ -23,14 +23,14 @@ use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
 
 /// Sites that a selector may choose from, with what the project asks of the choice.
-struct Offer<'a> {
+struct OfferedSites<'a> {
     /// As numbered in the dataset.
     sites: &'a [usize],
     positions: Vec<DVec3>,
     constraints: Constraints,
 }
 
-impl<'a> Offer<'a> {
+impl<'a> OfferedSites<'a> {
     fn new(
         inputs: &Inputs,
         simulated: &Simulated,
@@ -69,7 +69,7 @@ impl<'a> Offer<'a> {
         x: &SignalMatrix,
         targets: &[[f64; 3]],
         (watch, found): Telling,
-        selector: impl FnOnce(&Pool, &Request) -> Result<Selection, PlacementError>,
+        selector: impl FnOnce(&Pool, &SelectionRequest) -> Result<Selection, PlacementError>,
     ) -> Result<Selection, PlacementError> {
         let pool = Pool {
             x,
@@ -77,7 +77,7 @@ impl<'a> Offer<'a> {
             sites: self.sites,
             positions: &self.positions,
         };
-        let request = Request {
+        let request = SelectionRequest {
             constraints: &self.constraints,
             watch,
             found,
@@ -94,7 +94,7 @@ fn nearest(positions: &[DVec3], at: DVec3) -> Option<usize> {
 }
 
 /// Called with every set as soon as it is found, with the sites it counts in.
-pub type Found<'a> = &'a (dyn Fn(SelectorKind, &SensorSet, &[Site]) + Sync);
+pub type OnFound<'a> = &'a (dyn Fn(SelectorKind, &SensorSet, &[Site]) + Sync);
 
 /// Runs one selector.
 ///
@@ -103,12 +103,12 @@ pub type Found<'a> = &'a (dyn Fn(SelectorKind, &SensorSet, &[Site]) + Sync);
 pub fn select(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     kind: SelectorKind,
     budget: &Budget,
     watch: Watch,
 ) -> Result<Selection, DesignError> {
-    let unheard: Found = &|_, _, _| ();
+    let unheard: OnFound = &|_, _, _| ();
     select_step_by_step(inputs, simulated, reduced, kind, budget, watch, unheard)
 }
 
@@ -119,11 +119,11 @@ pub fn select(
 pub fn select_step_by_step(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     kind: SelectorKind,
     budget: &Budget,
     watch: Watch,
-    found: Found,
+    found: OnFound,
 ) -> Result<Selection, DesignError> {
     let mut selection = choose(inputs, simulated, reduced, kind, budget, watch, found)?;
     // Expected error is judged on a sample of presses, whose scatter counts beside what elements leave open: which of
@@ -155,11 +155,11 @@ pub fn model_tolerance(inputs: &Inputs, simulated: &Simulated) -> f64 {
 fn choose(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     kind: SelectorKind,
     budget: &Budget,
     watch: Watch,
-    found: Found,
+    found: OnFound,
 ) -> Result<Selection, DesignError> {
     let found = |set: &SensorSet| found(kind, set, &simulated.dataset.sites);
     let telling: Telling = (watch, &found);
@@ -188,10 +188,10 @@ type Telling<'a> = (Watch<'a>, &'a (dyn Fn(&SensorSet) + Sync));
 fn select_by_pivots(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     telling: Telling,
 ) -> Result<Selection, DesignError> {
-    let offer = Offer::new(inputs, simulated, &reduced.feasible)?;
+    let offer = OfferedSites::new(inputs, simulated, &reduced.feasible)?;
     let x = noisy_signals(inputs, reduced);
     let with_noise = inputs.project.selection.with_noise;
     let targets = simulated.dataset.targets_mm();
@@ -206,12 +206,13 @@ fn select_by_pivots(
 }
 
 /// A selector that asks a Gaussian process over the sites.
-type ByGeometry<'a> = &'a dyn Fn(&Geometry, &Pool, &Request) -> Result<Selection, PlacementError>;
+type ByGeometry<'a> =
+    &'a dyn Fn(&Geometry, &Pool, &SelectionRequest) -> Result<Selection, PlacementError>;
 
 fn select_by_geometry(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     by: ByGeometry,
     budget: &Budget,
     telling: Telling,
@@ -219,7 +220,7 @@ fn select_by_geometry(
     let located = reduced.locate(inputs, simulated, budget, telling.0)?;
     let Located { geometry, rows, .. } = located;
     let known: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
-    let offer = Offer::new(inputs, simulated, &known)?;
+    let offer = OfferedSites::new(inputs, simulated, &known)?;
     let x = reduced.x.select_rows(rows);
     let targets = simulated.dataset.targets_mm();
     let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
@@ -238,7 +239,7 @@ fn select_by_geometry(
 fn select_by_expected_error(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     budget: &Budget,
     telling: Telling,
 ) -> Result<Selection, DesignError> {
@@ -251,7 +252,7 @@ fn select_by_expected_error(
         detail: detail(budget),
         rounds: expected_error::ROUNDS,
     };
-    let offer = Offer::new(inputs, simulated, &reduced.feasible)?;
+    let offer = OfferedSites::new(inputs, simulated, &reduced.feasible)?;
     let targets = simulated.dataset.targets_mm();
     let selection = offer.choose(&reduced.x, &targets, telling, |pool, request| {
         selector.select(pool, request)
@@ -260,7 +261,7 @@ fn select_by_expected_error(
 }
 
 /// The feasible sites nearest to the places where gauges must be: rows of the reduced signals.
-fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &Reduced) -> Vec<usize> {
+fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &ReducedSites) -> Vec<usize> {
     let positions: Vec<DVec3> = (reduced.feasible.iter())
         .map(|&s| simulated.dataset.sites[s].gauge.position)
         .collect();
@@ -271,7 +272,7 @@ fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &Reduced) -> V
 fn select_by_svr(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     budget: &Budget,
     telling: Telling,
 ) -> Result<Selection, DesignError> {
@@ -308,7 +309,7 @@ fn select_by_svr(
         tolerance: greedy_svr::TOLERANCE,
         landmarks: 1.0,
     };
-    let offer = Offer::new(inputs, simulated, &sites)?;
+    let offer = OfferedSites::new(inputs, simulated, &sites)?;
     let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
         selector.select(pool, request)
     })?;

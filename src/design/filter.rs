@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::pressing::Pressing;
+use super::pressing::JigFilter;
 use super::{Inputs, Shortage, Simulated};
 use crate::dataset::Site;
 use crate::elasticity::support::supported_vertices;
@@ -48,7 +48,7 @@ impl LookedAt {
             supported: supported_vertices(&simulated.held),
             painted: inputs.painted.as_ref().map(on),
             kept_out: named.and_then(|name| inputs.masks.get(name)).map(on),
-            jig: Pressing::of(inputs, simulated).map(|jig| jig.gets_to(sites)),
+            jig: JigFilter::of(inputs, simulated).map(|jig| jig.gets_to(sites)),
         }
     }
 

@@ -34,7 +34,7 @@ pub struct Finest {
 
 /// Errors (mm) over the judge's touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Judged {
+pub struct JudgedErrors {
     /// Mean (mm).
     pub mean_mm: f64,
     /// Median (mm).
@@ -109,7 +109,7 @@ impl Finest {
         design: &Design,
         raised: f64,
         watch: Watch,
-    ) -> Result<Judged, DesignError> {
+    ) -> Result<JudgedErrors, DesignError> {
         let (simulated, chosen) = (&*design.simulated, design.chosen());
         let mut reference = self.reference(inputs, simulated, chosen, watch)?;
         for touch in &mut reference.touches {
@@ -141,7 +141,7 @@ impl Finest {
         };
         let everywhere = found.rows.first();
         let of = |figure: fn(&EvaluationRow) -> f64| everywhere.map_or(f64::NAN, figure);
-        Ok(Judged {
+        Ok(JudgedErrors {
             mean_mm: of(|r| r.error_mm),
             median_mm: of(|r| r.median_mm),
             p95_mm: of(|r| r.p95_mm),

@@ -15,8 +15,8 @@ use crate::elasticity::model::LoadCheck;
 use crate::elasticity::shell::check_section;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::{Model, Touch};
-use crate::feasible::Surroundings;
-use crate::mesh::walls::Side;
+use crate::feasible::SiteSurroundings;
+use crate::mesh::walls::WallSide;
 use crate::mesh::winding::Winding;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
@@ -181,7 +181,9 @@ pub fn overlapping_tetrahedra(inputs: &Inputs) -> Option<String> {
 }
 
 /// What the user has said of the faces of a solid, by place (m).
-fn declared_faces(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, DesignError> {
+fn declared_faces(
+    inputs: &Inputs,
+) -> Result<impl Fn(DVec3) -> Option<WallSide> + use<>, DesignError> {
     let part = Arc::clone(&inputs.part);
     let keys = &inputs.project.part;
     let mask = |key: &str, name: Option<&String>| {
@@ -199,8 +201,8 @@ fn declared_faces(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + us
             mask.as_ref().is_some_and(|mask| part.mostly_in(mask, at))
         };
         match (set(&inside), set(&outside)) {
-            (true, _) => Some(Side::Inside),
-            (_, true) => Some(Side::Outside),
+            (true, _) => Some(WallSide::Inside),
+            (_, true) => Some(WallSide::Outside),
             _ => None,
         }
     })
@@ -255,11 +257,11 @@ impl Ground {
         &self,
         points: &[SurfacePoint],
         watch: Watch,
-    ) -> Result<Option<Surroundings>, Cancelled> {
+    ) -> Result<Option<SiteSurroundings>, Cancelled> {
         let Self::Solid(solid) = self else {
             return Ok(None);
         };
-        Ok(Some(Surroundings {
+        Ok(Some(SiteSurroundings {
             behind: solid.behind(points),
             room: solid.room(points, watch)?,
         }))
@@ -276,12 +278,12 @@ impl Ground {
 
     /// What of the part is neither touched nor glued to, in plain words.
     #[must_use]
-    pub fn left_out(&self, surroundings: Option<&Surroundings>) -> Vec<String> {
+    pub fn left_out(&self, surroundings: Option<&SiteSurroundings>) -> Vec<String> {
         let Self::Solid(solid) = self else {
             return Vec::new();
         };
         let mut words = solid.reach.words(solid.fingertip);
-        if surroundings.is_some_and(Surroundings::are_closed) {
+        if surroundings.is_some_and(SiteSurroundings::are_closed) {
             words.push(
                 "No pad can be brought to the inside from outside: it is taken that gauges are glued before the part is closed.".into(),
             );

@@ -11,14 +11,14 @@ use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
 use crate::mesh::scatter::Scatter;
 use crate::placement::expected_error::{
-    Detail, Hand, Mistaken, NUISANCES, Pair, Scene, blind, least_helpful, most_helpful, taken_for,
-    worst_pairs,
+    Detail, GaugeInHand, Mistaken, MistakenPair, NUISANCES, TouchScene, blind, least_helpful,
+    most_helpful, taken_for, worst_pairs,
 };
 
 /// A scene of all sites of a simulation, and how it lies on the part. Sets are numbers of sites of the dataset.
 pub struct InHand {
     simulated: Arc<Simulated>,
-    scene: Scene,
+    scene: TouchScene,
     /// Where the presses are (m).
     presses: Vec<DVec3>,
     /// The presses of each force, and what they weigh on the surface that was computed.
@@ -31,7 +31,7 @@ pub struct InHand {
 
 /// What is expected of a set.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Expected {
+pub struct ExpectedInHand {
     /// Over where touches come, how hard they are and what is off.
     pub error_mm: f64,
     /// The same over the touches that are not blind; absent where all are.
@@ -76,18 +76,18 @@ impl InHand {
 
     /// A set of which one gauge moves.
     #[must_use]
-    pub fn hand(&self, set: &[usize], moves: usize) -> Hand<'_> {
-        Hand::around(&self.scene, set, moves)
+    pub fn hand(&self, set: &[usize], moves: usize) -> GaugeInHand<'_> {
+        GaugeInHand::around(&self.scene, set, moves)
     }
 
     /// What is expected of a set of which one gauge is in hand.
     #[must_use]
-    pub fn expected(&self, hand: &Hand, set: &[usize], moves: usize) -> Expected {
+    pub fn expected(&self, hand: &GaugeInHand, set: &[usize], moves: usize) -> ExpectedInHand {
         let errors = hand.errors_with(set[moves]);
         let blind = blind(&self.scene, set, self.force_n);
         let share: Vec<f64> = blind.iter().map(|&b| f64::from(u8::from(b))).collect();
         let mean = |of: &[f64]| self.scene.mean_among(of, |_| true).unwrap_or(0.0);
-        Expected {
+        ExpectedInHand {
             error_mm: mean(&errors),
             sighted_mm: self.scene.mean_among(&errors, |k| !blind[k]),
             blind: mean(&share),
@@ -130,7 +130,7 @@ impl InHand {
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for a stop.
-    pub fn worst_pairs(&self, set: &[usize], watch: Watch) -> Result<Vec<Pair>, Cancelled> {
+    pub fn worst_pairs(&self, set: &[usize], watch: Watch) -> Result<Vec<MistakenPair>, Cancelled> {
         worst_pairs(&self.scene, set, self.force_n, watch)
     }
 
@@ -160,12 +160,12 @@ impl InHand {
     }
 }
 
-fn scene(inputs: &Inputs, simulated: &Simulated, watch: Watch) -> Result<Scene, Cancelled> {
+fn scene(inputs: &Inputs, simulated: &Simulated, watch: Watch) -> Result<TouchScene, Cancelled> {
     let known = KnownSimulation::new(inputs, simulated);
     let variance = |site: usize, touch: usize| known.variance(site, touch);
     let felt = |site: usize, touch: usize| known.felt(site, touch);
     let dataset = &simulated.dataset;
-    Scene::new(
+    TouchScene::new(
         &dataset.x,
         &dataset.targets_mm(),
         &known.knowledge(&variance, &known.shared(&felt)),

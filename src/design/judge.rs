@@ -12,14 +12,16 @@ use super::known;
 use super::layout::test_touches;
 use super::presses::{self, Press, PressReadings};
 use super::reference::{Reference, grid, regions};
-use super::{DesignError, Inputs, MADE_SEED, NOISE_SEED, PRESS_SEED, Reduced, Simulated};
+use super::{DesignError, Inputs, MADE_SEED, NOISE_SEED, PRESS_SEED, ReducedSites, Simulated};
 use crate::as_made::as_made;
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix};
 use crate::elasticity::Model;
 use crate::elasticity::load::{Push, Touch};
 use crate::elasticity::sensitivity::Sensitivity;
-use crate::evaluation::{self, Candidate, Chooser, EstimatorKind, Evaluation, Judging, Trial};
+use crate::evaluation::{
+    self, Candidate, Chooser, EstimatorKind, Evaluation, EvaluationTrial, Judging,
+};
 use crate::gauge::Gauge;
 use crate::mesh::TriMesh;
 use crate::placement::Selection;
@@ -186,7 +188,7 @@ impl<'a> OfWorkshops<'a> {
 pub fn evaluate(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     selections: &[Selection],
     reference: &Reference,
     budget: &Budget,
@@ -264,7 +266,7 @@ pub(super) fn judge(
         .map(|t| (t.position * 1000.0).to_array())
         .collect();
     evaluation::evaluate(
-        &Trial {
+        &EvaluationTrial {
             signal: simulated.dataset.signal,
             train: &train,
             train_targets: &simulated.dataset.targets_mm(),
@@ -307,7 +309,7 @@ pub fn estimate(inputs: &Inputs, dataset: &Dataset, sites: &[usize], gamma: f64)
 #[must_use]
 pub fn sites_to_judge(
     by: EstimatorKind,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     selections: &[Selection],
 ) -> Vec<usize> {
     let mut sites = match by {

@@ -8,7 +8,7 @@ use super::{Inputs, SELECTION_NOISE_SEED, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{GluingSlopes, MakingSlope, MakingSlopes, Signal};
 use crate::placement::expected_error::{
-    Detail, Forces, Knowledge, NUISANCES, Scene, Shared, Variance, expected,
+    Detail, NUISANCES, SceneForces, SharedUnknowns, SignalKnowledge, TouchScene, Variance, expected,
 };
 use crate::project::Project;
 use crate::uncertainty::{Gluing, Making, Uncertainty};
@@ -94,11 +94,11 @@ impl<'a> KnownSimulation<'a> {
     pub fn shared<'b>(
         &self,
         felt: &'b (dyn Fn(usize, usize) -> [f64; NUISANCES] + Sync),
-    ) -> Shared<'b> {
+    ) -> SharedUnknowns<'b> {
         let (made, allowed) = (self.off.making, self.off.making_allowed());
         let share = |made: f64, allowed: f64| (allowed > 0.0).then(|| made / allowed);
         let aside = share(made.friction, allowed.friction);
-        Shared {
+        SharedUnknowns {
             felt,
             nuisances: [share(made.tip, allowed.tip), aside, aside],
             drift: self.off.drift,
@@ -109,16 +109,16 @@ impl<'a> KnownSimulation<'a> {
     pub fn knowledge<'b>(
         &'b self,
         variance: Variance<'b>,
-        shared: &'b Shared<'b>,
-    ) -> Knowledge<'b> {
-        Knowledge {
+        shared: &'b SharedUnknowns<'b>,
+    ) -> SignalKnowledge<'b> {
+        SignalKnowledge {
             noise: self.off.of_channel(),
             variance: Some(variance),
             shared: Some(shared),
             density: self.density.as_deref(),
             among: (self.simulated.dataset.slopes.as_ref())
                 .map(|slopes| slopes.columns().touches()),
-            forces: Some(Forces {
+            forces: Some(SceneForces {
                 touches: &self.forces,
                 coming: self.range,
                 possible: self.possible,
@@ -194,7 +194,7 @@ pub fn expected_errors(
     sites.dedup();
     let variance = |row: usize, touch: usize| known.variance(sites[row], touch);
     let felt = |row: usize, touch: usize| known.felt(sites[row], touch);
-    let scene = Scene::new(
+    let scene = TouchScene::new(
         &simulated.dataset.x.select_rows(&sites),
         &simulated.dataset.targets_mm(),
         &known.knowledge(&variance, &known.shared(&felt)),

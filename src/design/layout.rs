@@ -13,7 +13,7 @@ use crate::memory;
 use crate::mesh::reach::Finger;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{Edge, SurfacePoint, TriMesh, sample};
-use crate::project::{BadValue, Lattice, PartModel, Project};
+use crate::project::{BadValue, PartModel, Project, SiteLattice};
 
 /// Most touches that the slopes of gluing are found for, evenly chosen: a variance needs no more.
 pub const SLOPE_TOUCHES: usize = 1300;
@@ -114,8 +114,8 @@ pub fn lay_out_sites(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<SurfacePoint
     let project = &inputs.project;
     let count = count_sites(mesh, project)?;
     let points = match project.sites.lattice {
-        Lattice::Even => sample::even(mesh, count, project.budget.seed, |_| true),
-        Lattice::Unrolled => unrolled_sites(mesh, inputs)?,
+        SiteLattice::Even => sample::even(mesh, count, project.budget.seed, |_| true),
+        SiteLattice::Unrolled => unrolled_sites(mesh, inputs)?,
     };
     if points.is_empty() {
         let area_mm2 = mesh.area() * 1e6;
@@ -472,7 +472,7 @@ mod tests {
         let (panel, _) = TriMesh::new(&positions, &triangles, 0).unwrap();
         let mut project = Project::around("panel.obj", Some(Unit::Metre));
         project.sites.spacing_mm = 4.0;
-        project.sites.lattice = Lattice::Unrolled;
+        project.sites.lattice = SiteLattice::Unrolled;
         let inputs = Inputs {
             project,
             part: Arc::new(panel.clone()),

@@ -6,8 +6,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    DesignError, Found, Inputs, Reduced, Reference, Simulated, evaluate, expected_errors, filter,
-    reduce_sites, reference, refine, select_step_by_step, simulate, sites_to_judge,
+    DesignError, Inputs, OnFound, ReducedSites, Reference, Simulated, evaluate, expected_errors,
+    filter, reduce_sites, reference, refine, select_step_by_step, simulate, sites_to_judge,
 };
 use crate::budget::{Budget, Watch, Work};
 use crate::evaluation::{Chooser, Evaluation, EvaluationRow, SetId};
@@ -26,7 +26,7 @@ pub struct Design {
     /// Which sites gauges fit on, and why not on the others.
     pub feasibility: Arc<Feasibility>,
     /// The feasible sites.
-    pub reduced: Arc<Reduced>,
+    pub reduced: Arc<ReducedSites>,
     /// What the feasible sites were reduced to; absent where nobody asked for that, and all of them are candidates.
     pub candidates: Option<Arc<Candidates>>,
     /// What each selector chose.
@@ -47,7 +47,7 @@ pub struct Design {
 #[derive(Clone, Default)]
 pub struct KnownStages {
     /// Feasibility, and the sites that passed.
-    pub reduced: Option<(Arc<Feasibility>, Arc<Reduced>)>,
+    pub reduced: Option<(Arc<Feasibility>, Arc<ReducedSites>)>,
     /// By the same selectors in the same order; of the simulation that goes with them, which has the gauges that were
     /// moved off its lattice.
     pub selections: Option<Arc<Vec<Selection>>>,
@@ -59,7 +59,7 @@ pub struct KnownStages {
 
 /// The steps of a design after its simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum DesignStep {
     /// Filters and candidates.
     Reduce,
     /// The selectors.
@@ -77,9 +77,9 @@ pub struct Hooks<'a> {
     /// Told of progress; may ask for a stop.
     pub watch: Watch<'a>,
     /// Told of each set as soon as it is known.
-    pub found: Found<'a>,
+    pub found: OnFound<'a>,
     /// Told of each step as it begins.
-    pub entered: &'a dyn Fn(Step),
+    pub entered: &'a dyn Fn(DesignStep),
 }
 
 /// Seconds by the clock of one stage.
@@ -232,19 +232,19 @@ impl Design {
     /// All words, those that may change a decision first; at most three of them are to be read at once, and where there are
     /// doubts, those before them.
     #[must_use]
-    pub fn words(&self) -> Words {
+    pub fn words(&self) -> DesignWords {
         /// More than that nobody reads before a decision.
         const OPEN: usize = 3;
         let mut open = self.cautions();
         let room = OPEN.saturating_sub(self.doubts().len());
         let mut folded = open.split_off(open.len().min(room));
         folded.extend(self.notes());
-        Words { open, folded }
+        DesignWords { open, folded }
     }
 }
 
 /// What a design says of itself, sentence by sentence.
-pub struct Words {
+pub struct DesignWords {
     /// What may change a decision.
     pub open: Vec<String>,
     /// How the numbers came about; for whoever looks closer.
@@ -324,7 +324,7 @@ pub fn run_step_by_step(
         .or(kinds.first())
         .unwrap_or(&asked);
     let mut times = Stopwatch::new(hooks.clock);
-    (hooks.entered)(Step::Reduce);
+    (hooks.entered)(DesignStep::Reduce);
     let (feasibility, reduced) = if let Some(known) = known.reduced {
         known
     } else {
@@ -334,7 +334,7 @@ pub fn run_step_by_step(
         (Arc::new(feasibility), Arc::new(reduced))
     };
     let candidates = candidates(inputs, &reduced, kinds, &mut times, watch)?;
-    (hooks.entered)(Step::Select);
+    (hooks.entered)(DesignStep::Select);
     let (simulated, selections) = if let Some(known) = known.selections {
         (simulated, known)
     } else {
@@ -347,7 +347,7 @@ pub fn run_step_by_step(
         }
         (refined, Arc::new(chosen))
     };
-    (hooks.entered)(Step::Evaluate);
+    (hooks.entered)(DesignStep::Evaluate);
     let judging = inputs.project.judging();
     let by = judging.estimator();
     let judged = sites_to_judge(by, &reduced, &selections);
@@ -394,7 +394,7 @@ pub fn run_step_by_step(
 /// The candidates, where somebody asks for them.
 fn candidates(
     inputs: &Inputs,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     kinds: &[SelectorKind],
     times: &mut Stopwatch,
     watch: Watch,
@@ -413,7 +413,7 @@ fn candidates(
 fn select_all(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     kinds: &[SelectorKind],
     budget: &Budget,
     times: &mut Stopwatch,
@@ -441,7 +441,7 @@ fn select_all(
 fn finish_chosen(
     inputs: &Inputs,
     simulated: Arc<Simulated>,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     chosen: &mut [Selection],
     budget: &Budget,
     hooks: &Hooks,

@@ -11,7 +11,7 @@ use super::as_built::WORKSHOPS;
 use crate::dataset::SignalMatrix;
 use crate::elasticity::Touch;
 use crate::mesh::TriMesh;
-use crate::uncertainty::Pressing;
+use crate::uncertainty::HandPressing;
 
 /// A press, as it was asked for and as it was made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,12 @@ pub struct PressReadings {
 }
 
 /// Presses on a surface as a hand makes them: each as far off as is usual for it, in any direction and either way.
-pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, hand: &Pressing, seed: u64) -> Vec<Press> {
+pub(super) fn by_hand(
+    mesh: &TriMesh,
+    asked: Vec<Touch>,
+    hand: &HandPressing,
+    seed: u64,
+) -> Vec<Press> {
     let index = mesh.index();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let make = |asked: Touch| {
@@ -84,7 +89,7 @@ mod tests {
             tip_radius: 5e-3,
         };
         let all: Vec<Touch> = (1..13).map(asked).collect();
-        let hand = Pressing {
+        let hand = HandPressing {
             place: 2e-3,
             force: 0.05,
             friction: 0.0,

@@ -13,12 +13,12 @@ use crate::jig::{FILM, RodReach, Wall};
 use crate::project::PartModel;
 
 /// The jig that sites are filtered by.
-pub(super) struct Pressing {
+pub(super) struct JigFilter {
     reach: RodReach,
     face: InnerFace,
 }
 
-impl Pressing {
+impl JigFilter {
     /// Nothing where it is not asked for.
     pub(super) fn of(inputs: &Inputs, simulated: &Simulated) -> Option<Self> {
         let project = &inputs.project;

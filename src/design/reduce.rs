@@ -21,7 +21,7 @@ use crate::regression::Standardizer;
 use crate::regression::folds::evenly;
 
 /// The feasible sites, and what selectors that ask for it make of them: once, whoever asks first.
-pub struct Reduced {
+pub struct ReducedSites {
     /// Feasible sites, as numbered in the dataset.
     pub feasible: Vec<usize>,
     /// Signals of the feasible sites.
@@ -52,7 +52,7 @@ pub struct Located {
     pub sites: Vec<usize>,
 }
 
-impl Reduced {
+impl ReducedSites {
     /// The components of the signals.
     ///
     /// # Errors
@@ -154,7 +154,7 @@ pub fn reduce_sites(
     simulated: &Simulated,
     feasibility: &Feasibility,
     budget: &Budget,
-) -> Result<Reduced, DesignError> {
+) -> Result<ReducedSites, DesignError> {
     let feasible = feasibility.sites();
     let sensors = inputs.project.selection.sensors;
     if sensors.max(1) > feasible.len() {
@@ -165,7 +165,7 @@ pub fn reduce_sites(
     if Standardizer::of(&x).deviation.iter().all(|d| *d <= 0.0) {
         return Err(PlacementError::from(PcaError::Constant).into());
     }
-    Ok(Reduced {
+    Ok(ReducedSites {
         feasible,
         x,
         asked: ReductionRequest {
@@ -221,7 +221,7 @@ fn enough_touches(
 pub fn geometry(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     budget: &Budget,
     watch: Watch,
 ) -> Result<Located, Cancelled> {
@@ -269,7 +269,10 @@ pub fn geometry(
 }
 
 /// The signals of the feasible sites that selectors choose from, with noise where that is asked for.
-pub(super) fn noisy_signals<'a>(inputs: &Inputs, reduced: &'a Reduced) -> Cow<'a, SignalMatrix> {
+pub(super) fn noisy_signals<'a>(
+    inputs: &Inputs,
+    reduced: &'a ReducedSites,
+) -> Cow<'a, SignalMatrix> {
     let project = &inputs.project;
     let noise = if project.selection.with_noise && project.gauge.signal == Signal::Strain {
         project.uncertainty().of_channel()

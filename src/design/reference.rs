@@ -5,7 +5,7 @@ use super::{Inputs, NOISE_SEED};
 use crate::budget::Work;
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::load::Touch;
-use crate::evaluation::{self, EstimatorKind, TouchRegion};
+use crate::evaluation::{self, EstimatorKind, NamedRegion};
 use crate::gauge::Gauge;
 use crate::project::{Project, boxes};
 use crate::uncertainty::Uncertainty;
@@ -16,7 +16,7 @@ pub struct Reference {
     /// The held-out touches.
     pub touches: Vec<Touch>,
     /// Regions that errors are quoted for.
-    pub regions: Vec<TouchRegion>,
+    pub regions: Vec<NamedRegion>,
     /// Element size of the reference model (mm).
     pub element_mm: f64,
     /// What it took.
@@ -45,7 +45,7 @@ pub(super) fn grid(project: &Project) -> Option<[f64; 2]> {
     matching.then_some(project.gauge.grid())
 }
 
-pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<TouchRegion> {
+pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<NamedRegion> {
     project
         .evaluation
         .regions
@@ -53,7 +53,7 @@ pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<TouchRegion> 
         .map(|region| {
             let place = boxes::oriented(&region.box_mm, region.box_axis);
             let inside = |t: &Touch| boxes::contains(&place, t.position);
-            TouchRegion {
+            NamedRegion {
                 name: region.name.clone(),
                 contains: touches.iter().map(inside).collect(),
             }

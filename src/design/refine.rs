@@ -21,9 +21,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use self::room::Room;
+use self::room::GaugeRoom;
 use super::known::{FINE, KnownSimulation, detail};
-use super::{DesignError, Inputs, Reduced, Simulated};
+use super::{DesignError, Inputs, ReducedSites, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
 use crate::elasticity::Touch;
@@ -59,7 +59,7 @@ const CONFIRM_SEED: u64 = 0xc0f1;
 pub fn refine(
     inputs: &Inputs,
     simulated: Arc<Simulated>,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     selection: &mut Selection,
     budget: &Budget,
     watch: Watch,
@@ -144,7 +144,7 @@ impl Refined {
 fn search(
     inputs: &Inputs,
     simulated: &Simulated,
-    reduced: &Reduced,
+    reduced: &ReducedSites,
     set: &[usize],
     budget: &Budget,
     watch: Watch,
@@ -194,8 +194,8 @@ fn search(
             reach: 1.0,
             moved: false,
         });
-    let mut search = Search {
-        room: Room::new(inputs, simulated),
+    let mut search = RefineSearch {
+        room: GaugeRoom::new(inputs, simulated),
         known: &known,
         pressed: &pressed,
         made,
@@ -211,8 +211,8 @@ fn search(
     search.run()
 }
 
-struct Search<'a> {
-    room: Room<'a>,
+struct RefineSearch<'a> {
+    room: GaugeRoom<'a>,
     known: &'a KnownSimulation<'a>,
     pressed: &'a PressedModel<'a>,
     /// The touches that are pressed, and how far off they are made.
@@ -231,7 +231,7 @@ struct Search<'a> {
     watch: Watch<'a>,
 }
 
-impl Search<'_> {
+impl RefineSearch<'_> {
     fn run(&mut self) -> Result<Refined, DesignError> {
         for k in 0..self.gauges.len() {
             self.sit(k);

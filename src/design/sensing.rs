@@ -57,7 +57,7 @@ pub struct Sensing {
 }
 
 /// Readings of the model under touches of many forces: what the trained estimators learn from.
-pub struct Lesson {
+pub struct SimulatedLesson {
     /// Channels × touches, strain.
     pub x: SignalMatrix,
     /// Where each touch was (mm).
@@ -210,7 +210,12 @@ impl Sensing {
     ///
     /// # Errors
     /// [`DesignError`] where no touch lands on the part.
-    pub fn lessons(&self, inputs: &Inputs, count: usize, seed: u64) -> Result<Lesson, DesignError> {
+    pub fn lessons(
+        &self,
+        inputs: &Inputs,
+        count: usize,
+        seed: u64,
+    ) -> Result<SimulatedLesson, DesignError> {
         const FORCES: [f64; 2] = [0.5, 34.3];
         const SEED: u64 = 0x1e55;
         let touches = self.touches(inputs, count, seed.wrapping_add(SEED), true)?;
@@ -222,7 +227,7 @@ impl Sensing {
             |(touch, &force): (&Touch, &f64)| self.sensitivity.read(&Touch { force, ..*touch });
         let columns: Vec<Vec<f64>> = touches.par_iter().zip(&forces).map(read).collect();
         let values = (0..self.gauges.len()).flat_map(|c| columns.iter().map(move |x| x[c]));
-        Ok(Lesson {
+        Ok(SimulatedLesson {
             x: SignalMatrix::new(touches.len(), values.collect()),
             places_mm: touches
                 .iter()

@@ -18,7 +18,7 @@ use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::support::HeldRegion;
 use crate::elasticity::{DofSet, Model, Support, Touch};
-use crate::feasible::Surroundings;
+use crate::feasible::SiteSurroundings;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain::digits;
 use crate::project::{ElementKind, PartModel, Project};
@@ -43,7 +43,7 @@ pub struct Simulated {
     /// Where the sites lie on the mesh.
     pub points: Vec<SurfacePoint>,
     /// What lies before and behind the sites of a solid.
-    pub surroundings: Option<Surroundings>,
+    pub surroundings: Option<SiteSurroundings>,
     /// The sites of the lattice, and after them gauges that were moved off it.
     pub dataset: Dataset,
     /// How many sites the lattice has.
@@ -83,7 +83,7 @@ impl Simulated {
         &self,
         points: &[SurfacePoint],
         watch: Watch,
-    ) -> Result<Option<Surroundings>, Cancelled> {
+    ) -> Result<Option<SiteSurroundings>, Cancelled> {
         let Some(known) = &self.surroundings else {
             return Ok(None);
         };
@@ -298,7 +298,7 @@ fn read(
     let ground = Ground::of(&meshed);
     let surroundings = ground.surroundings(&points, watch)?;
     notes.extend(ground.left_out(surroundings.as_ref()));
-    let surroundings = surroundings.map(Surroundings::opened);
+    let surroundings = surroundings.map(SiteSurroundings::opened);
     let carried = carry(&mesh, &inputs.part);
     Ok(Simulated {
         achieved: Achieved {

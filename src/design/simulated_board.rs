@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::presses::{self, Press};
 use super::{DesignError, Inputs, PRESS_SEED, Sensing, Workshop};
 use crate::as_made::as_made;
-use crate::board::{Disturbances, Faults, Options, Script, SimulatedBoard, fitting_gain};
+use crate::board::{BoardOptions, Disturbances, Faults, PressScript, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
 use crate::draw::normal;
 use crate::elasticity::respond;
@@ -20,8 +20,8 @@ const WANDER_S: f64 = 10.0;
 
 /// What a simulated board of a project is like where nothing else is asked for.
 #[must_use]
-pub fn options(inputs: &Inputs, channels: usize) -> Options {
-    Options {
+pub fn options(inputs: &Inputs, channels: usize) -> BoardOptions {
+    BoardOptions {
         seed: inputs.project.budget.seed,
         rate_hz: 1000,
         chain: Chain::default(),
@@ -62,9 +62,9 @@ pub fn simulated(
     inputs: &Inputs,
     sensing: &Sensing,
     workshop: Workshop,
-    script: Script,
+    script: PressScript,
     hardest: Option<f64>,
-    mut options: Options,
+    mut options: BoardOptions,
     faults: Faults,
     watch: Watch,
 ) -> Result<SimulatedBoard, DesignError> {

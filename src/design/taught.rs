@@ -15,12 +15,12 @@ use crate::budget::{Cancelled, Watch};
 use crate::dataset::SignalMatrix;
 use crate::inference::calibration::{calibrate, noise_of_mean};
 use crate::inference::remainder::{self, Remainder};
-use crate::inference::{Deviations, Errors, KnownPress, Matching, Nuisances, ResponseMap};
-use crate::learning::{Answer, ByModel, Lessons};
+use crate::inference::{Deviations, KnownPress, Matching, Nuisances, ReadingErrors, ResponseMap};
+use crate::learning::{ByModel, Estimate, MeasuredTouches};
 use crate::live::{GaugeModel, PipelineSettings};
 use crate::project::Project;
 use crate::regression::folds::evenly;
-use crate::uncertainty::{Gluing, Pressing, Uncertainty};
+use crate::uncertainty::{Gluing, HandPressing, Uncertainty};
 
 /// Readings that gauges are calibrated by, at most: what more of them say is learned as a remainder.
 const CALIBRATED_BY: usize = 600;
@@ -44,17 +44,17 @@ pub struct Taught {
     /// See [`Nuisances`].
     pub axes: Option<Arc<[ResponseMap; 3]>>,
     /// What else is known of the readings.
-    pub known: Knowledge,
+    pub known: TaughtKnowledge,
     /// Errors over the radius, of touches that nothing was learned from.
     pub ratios: Vec<f64>,
 }
 
 /// What is known of readings beside the map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Knowledge {
+pub struct TaughtKnowledge {
     /// Standard deviation of the noise of a reading that was learned from (strain).
     pub noise: f64,
-    /// What the map leaves, over the reading; see [`Errors::relative`].
+    /// What the map leaves, over the reading; see [`ReadingErrors::relative`].
     pub relative: f64,
     /// Nobody presses harder (N).
     pub most_force: f64,
@@ -125,8 +125,8 @@ impl<'a> PressLessons<'a> {
     pub fn new(
         sensing: &'a Sensing,
         project: &'a Project,
-        lessons: &Lessons,
-        pressing: Pressing,
+        lessons: &MeasuredTouches,
+        pressing: HandPressing,
     ) -> Result<Self, TeachingError> {
         let none = lessons.places_mm.is_empty();
         if lessons.forces.len() != lessons.places_mm.len() {
@@ -225,7 +225,7 @@ impl<'a> PressLessons<'a> {
             own,
             tip,
             axes,
-            known: Knowledge {
+            known: TaughtKnowledge {
                 noise: noise.first().copied().unwrap_or(0.0).max(LEAST_NOISE),
                 relative: remainder.map_or(calibration.relative, |r| r.scatter),
                 most_force: self.project.live.largest_force_n,
@@ -294,14 +294,14 @@ impl Taught {
 
     /// What readings (channels × touches, strain) say, touch by touch.
     #[must_use]
-    pub fn find(&self, x: &SignalMatrix) -> Vec<Answer> {
+    pub fn find(&self, x: &SignalMatrix) -> Vec<Estimate> {
         use rayon::prelude::*;
         let model = self.model();
         let channels = self.channels();
-        let errors = Errors {
+        let errors = ReadingErrors {
             relative: self.known.relative,
             noise: vec![self.known.noise; channels],
-            ..Errors::known(&model.off, channels, model.deviations)
+            ..ReadingErrors::known(&model.off, channels, model.deviations)
         };
         let matching = Matching::new(model.map, errors, self.known.most_force);
         (0..x.columns())
@@ -311,7 +311,7 @@ impl Taught {
                 |matching, t| {
                     let reading: Vec<f64> = (0..channels).map(|c| x.row(c)[t]).collect();
                     let contact = matching.find(&reading);
-                    Answer {
+                    Estimate {
                         place_mm: (contact.position * 1e3).to_array(),
                         radius_mm: contact.region.radius * 1e3,
                         force_n: Some(contact.force),

@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 use super::taught::Taught;
 use crate::inference::remainder::{RemainderSettings, matern};
-use crate::inference::{Errors, cramer_rao};
+use crate::inference::{ReadingErrors, cramer_rao};
 use crate::regression::folds::evenly;
 
 /// What is thought of a map that nothing was learned of: as [`crate::inference::remainder`] does beforehand, the length as a
@@ -43,7 +43,7 @@ pub fn most_telling(
     let all: Vec<DVec3> = (some.iter().map(|&k| places[k]))
         .chain(known.iter().map(|&k| pressed[k]))
         .collect();
-    let mut unknown = Unknown::new(taught, &all, settings, force);
+    let mut unknown = MapUnknown::new(taught, &all, settings, force);
     for k in some.len()..all.len() {
         unknown.press(k);
     }
@@ -86,10 +86,10 @@ fn squared_error(taught: &Taught, place: DVec3, force: f64, relative: f64) -> f6
     let (at, _) = taught.map.mesh.index().nearest(place);
     let reading: Vec<f64> = taught.map.at(at).iter().map(|g| force * g).collect();
     let channels = reading.len();
-    let errors = Errors {
+    let errors = ReadingErrors {
         relative,
         noise: vec![taught.known.noise; channels],
-        ..Errors::of_noise(taught.known.noise, channels)
+        ..ReadingErrors::of_noise(taught.known.noise, channels)
     };
     let own = taught.own.at(at);
     let noise: Vec<f64> = (errors.weights(&reading, &vec![true; channels]).iter())
@@ -101,13 +101,13 @@ fn squared_error(taught: &Taught, place: DVec3, force: f64, relative: f64) -> f6
 }
 
 /// What is not known of the map at some places: a covariance.
-struct Unknown {
+struct MapUnknown {
     covariance: DMatrix<f64>,
     /// Variance of what a press at each of them has for itself.
     own: Vec<f64>,
 }
 
-impl Unknown {
+impl MapUnknown {
     /// Before anything is pressed.
     fn new(taught: &Taught, places: &[DVec3], settings: RemainderSettings, force: f64) -> Self {
         let prior = settings.share * settings.share;
@@ -150,7 +150,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::design::Knowledge;
+    use crate::design::TaughtKnowledge;
     use crate::inference::ResponseMap;
     use crate::mesh::TriMesh;
 
@@ -187,7 +187,7 @@ mod tests {
             own: Arc::new(own),
             tip: None,
             axes: None,
-            known: Knowledge {
+            known: TaughtKnowledge {
                 noise: 1e-7,
                 relative: 0.02,
                 most_force: 60.0,

@@ -6,10 +6,10 @@ use crate::budget::Watch;
 use crate::dataset::SignalMatrix;
 use crate::learning::lessons::Division;
 use crate::learning::still::over_radius;
-use crate::learning::train::Trial;
+use crate::learning::train::MethodTrial;
 use crate::learning::{
-    Answer, ByModel, Family, LearningError, Lessons, Method, Scores, TouchEstimator, Trained,
-    TrainingRequest, train,
+    ByModel, Estimate, Family, LearningError, MeasuredTouches, Method, Scores, TouchEstimator,
+    TrainedEstimator, TrainingRequest, train,
 };
 use crate::regression::tune::distances;
 use crate::statistics::{mean, midpoint_median};
@@ -54,7 +54,7 @@ impl Learned {
 
     /// What readings (channels × touches, in the unit that was learned from) say, touch by touch.
     #[must_use]
-    pub fn find(&self, x: &SignalMatrix) -> Vec<Answer> {
+    pub fn find(&self, x: &SignalMatrix) -> Vec<Estimate> {
         match self {
             Self::Regression(estimator) => estimator.find(x),
             Self::Matching(taught) => taught.find(x),
@@ -63,7 +63,7 @@ impl Learned {
 }
 
 /// What came of a training.
-pub struct Outcome {
+pub struct TrainingOutcome {
     /// The estimator that was chosen.
     pub estimator: Learned,
     /// How it answers.
@@ -71,7 +71,7 @@ pub struct Outcome {
     /// What finds forces, where they were learned by a regression.
     pub force: Option<Family>,
     /// Every method's error on the validation touches.
-    pub tried: Vec<Trial>,
+    pub tried: Vec<MethodTrial>,
     /// On the test touches.
     pub scores: Scores,
     /// Mean error on the validation touches (mm).
@@ -83,7 +83,7 @@ pub struct Outcome {
 }
 
 /// Who is tried.
-pub struct Candidates<'a> {
+pub struct TrialMethods<'a> {
     /// Regressions: the one that is asked for, or all.
     pub regressions: bool,
     /// Matching in these ways, by presses of a part that there is a model of.
@@ -96,13 +96,13 @@ pub struct Candidates<'a> {
 /// # Errors
 /// [`LearningError`] for touches that nothing can be learned from, or when the watch asks for a stop.
 pub fn train_all(
-    lessons: &Lessons,
+    lessons: &MeasuredTouches,
     asked: &TrainingRequest,
-    candidates: &Candidates,
+    candidates: &TrialMethods,
     watch: Watch,
-) -> Result<Outcome, LearningError> {
+) -> Result<TrainingOutcome, LearningError> {
     let alone = (candidates.regressions).then(|| train(lessons, asked, watch));
-    let mut best: Option<Outcome> =
+    let mut best: Option<TrainingOutcome> =
         match alone {
             // With a model more can be learned than without.
             Some(Err(
@@ -118,7 +118,7 @@ pub fn train_all(
         touches.iter().map(|&t| lessons.places_mm[t]).collect()
     };
     let truth = of(&division.validation);
-    let off = |answers: &[Answer]| errors(answers, &truth);
+    let off = |answers: &[Estimate]| errors(answers, &truth);
     let x = lessons.x.select_columns(&division.validation);
     let mut leading = (best.as_ref()).map(|best| off(&best.estimator.find(&x)));
     let mut tried = best.as_ref().map_or(Vec::new(), |b| b.tried.clone());
@@ -129,7 +129,7 @@ pub fn train_all(
         let validation_mm = mean(&found);
         taught.ratios = over_radius(&answers, &truth);
         let method = Method::Model(way);
-        tried.push(Trial {
+        tried.push(MethodTrial {
             estimator: method,
             validation_mm,
         });
@@ -139,7 +139,7 @@ pub fn train_all(
         leading = Some(found);
         let forces: Vec<f64> = division.test.iter().map(|&t| lessons.forces[t]).collect();
         let answers = taught.find(&lessons.x.select_columns(&division.test));
-        best = Some(Outcome {
+        best = Some(TrainingOutcome {
             scores: Scores::of(&answers, &of(&division.test), &forces),
             estimator: Learned::Matching(Box::new(taught)),
             method,
@@ -151,10 +151,10 @@ pub fn train_all(
         });
     }
     let best = best.ok_or(LearningError::Singular)?;
-    Ok(Outcome { tried, ..best })
+    Ok(TrainingOutcome { tried, ..best })
 }
 
-fn errors(answers: &[Answer], places_mm: &[[f64; 3]]) -> Vec<f64> {
+fn errors(answers: &[Estimate], places_mm: &[[f64; 3]]) -> Vec<f64> {
     let said: Vec<[f64; 3]> = answers.iter().map(|a| a.place_mm).collect();
     distances(&said, places_mm)
 }
@@ -174,8 +174,8 @@ fn is_nearer(one: &[f64], other: &[f64]) -> bool {
     median(one) < median(other)
 }
 
-impl From<Trained> for Outcome {
-    fn from(trained: Trained) -> Self {
+impl From<TrainedEstimator> for TrainingOutcome {
+    fn from(trained: TrainedEstimator) -> Self {
         Self {
             force: trained.estimator.force.as_ref().map(|f| f.family),
             estimator: Learned::Regression(Box::new(trained.estimator)),

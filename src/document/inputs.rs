@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::{Document, Layer};
-use crate::budget::{Limits, Quality};
+use crate::budget::{BudgetLimits, Quality};
 use crate::dataset::{Signal, Site};
 use crate::evaluation::Judging;
 use crate::io::trade_file::without_knobs;
@@ -21,7 +21,7 @@ use crate::project::{
 type Mask = Option<Arc<Vec<bool>>>;
 
 /// The supports, with what the masks they name hold.
-type Held = Vec<(SupportKeys, Mask)>;
+type HeldSupports = Vec<(SupportKeys, Mask)>;
 
 /// What the elastic model alone depends on.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct ModelInputs {
     /// Without the path of its mesh: saving under another name changes nothing that was computed.
     part: Part,
     material: MaterialKeys,
-    held: Held,
+    held: HeldSupports,
 }
 
 /// What a simulation depends on beside what gauges report: its elements, sites and touches.
@@ -44,7 +44,7 @@ pub struct ElementInputs {
     sites: SiteKeys,
     quality: Quality,
     seed: u64,
-    limits: Limits,
+    limits: BudgetLimits,
     /// A region that is not there cannot be computed with.
     keep_out_missing: bool,
 }
@@ -129,7 +129,7 @@ pub struct DesignInputs {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaintInputs {
     layers: [Mask; Layer::ALL.len()],
-    held: Held,
+    held: HeldSupports,
 }
 
 /// What a measured trade of speed against accuracy holds for: everything but its knobs.
@@ -148,7 +148,7 @@ pub struct WallInputs {
     tip_radius_mm: f64,
     reach_mm: f64,
     quality: Quality,
-    limits: Limits,
+    limits: BudgetLimits,
     touches: usize,
     inside: Mask,
     outside: Mask,
@@ -205,7 +205,7 @@ impl Document {
         self.state.masks.get(name).cloned()
     }
 
-    fn held(&self) -> Held {
+    fn held(&self) -> HeldSupports {
         let mask = |s: &SupportKeys| self.mask(s.vertices.as_ref()?);
         let supports = &self.state.project.supports;
         supports.iter().map(|s| (s.clone(), mask(s))).collect()

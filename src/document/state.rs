@@ -7,7 +7,7 @@ use crate::project::{Masks, Project, SupportKeys, SupportKind};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
 #[derive(Clone, PartialEq)]
-pub struct State {
+pub struct DocumentState {
     pub project: Project,
     /// Where gauges may go, one value a vertex of the part; absent when nothing was painted.
     pub painted: Option<Arc<Vec<bool>>>,
@@ -99,7 +99,7 @@ fn key_mut(project: &mut Project, layer: Layer) -> Option<(&mut Option<String>, 
     }
 }
 
-impl State {
+impl DocumentState {
     /// The vertices of a layer, where any were painted.
     #[must_use]
     pub fn layer(&self, layer: Layer) -> Option<&Arc<Vec<bool>>> {

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
 
-use super::material::Section;
+use super::material::ShellSection;
 use super::membrane::{Matrix3x9, Matrix9};
 
 /// Corners of the sides: 12, 23, 31.
@@ -31,7 +31,7 @@ pub struct Bending {
 impl Bending {
     /// Corners `x`, `y` counter-clockwise (m).
     #[must_use]
-    pub fn new(x: [f64; 3], y: [f64; 3], section: &Section) -> Self {
+    pub fn new(x: [f64; 3], y: [f64; 3], section: &ShellSection) -> Self {
         let twice = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
         let mut element = Self {
             dx: [y[1] - y[2], y[2] - y[0], y[0] - y[1]].map(|b| b / twice),
@@ -65,7 +65,7 @@ impl Bending {
 
     /// Stiffness (N/m, N, N·m by degree of freedom), integrated exactly.
     #[must_use]
-    pub fn stiffness(&self, section: &Section) -> Matrix9 {
+    pub fn stiffness(&self, section: &ShellSection) -> Matrix9 {
         let bending = section.plane_stress() * (section.thickness.powi(3) / 12.0);
         let shear = section.shear_stiffness();
         let mut k = Matrix9::zeros();

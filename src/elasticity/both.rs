@@ -1,13 +1,13 @@
 //! What outputs read of loads, with one side solved above a cut of the elimination tree and the other divided out below it
-//! ([`super::solver::Reduced`]).
+//! ([`super::solver::ReducedBlock`]).
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::rows::Rows;
-use super::solver::{BLOCK, Cut, Reduced, Scratch, common};
+use super::rows::SparseRows;
+use super::solver::{BLOCK, Cut, ReducedBlock, SolveScratch, common};
 use super::spare::Spare;
 use super::system::{Needed, System};
 use crate::budget::{Cancelled, Watch, report};
@@ -15,7 +15,7 @@ use crate::memory;
 
 /// Rows over solved blocks, in blocks of neighbours, with what of the factor they reach.
 pub(super) struct Reaching<'a> {
-    rows: &'a Rows,
+    rows: &'a SparseRows,
     blocks: Vec<Reached>,
 }
 
@@ -26,7 +26,7 @@ struct Reached {
 }
 
 /// What was read, block by block: the rows of one side that it holds, and values.
-pub(super) type Blocks = Vec<(Vec<u32>, Vec<f64>)>;
+pub(super) type ReadBlocks = Vec<(Vec<u32>, Vec<f64>)>;
 
 /// Multiplications that four ways take: to solve for one side or for the other, all the way or above the cut.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +44,7 @@ const SAMPLE: usize = 48;
 
 impl<'a> Reaching<'a> {
     /// Of some rows over the solved blocks of a system.
-    pub fn new(system: &System, rows: &'a Rows) -> Self {
+    pub fn new(system: &System, rows: &'a SparseRows) -> Self {
         let blocks = rows.in_blocks().into_par_iter().map(|numbers| {
             let places = (numbers.iter()).flat_map(|&row| rows.row(row as usize).iter());
             Reached {
@@ -59,7 +59,7 @@ impl<'a> Reaching<'a> {
     }
 
     /// The rows themselves.
-    pub fn rows(&self) -> &Rows {
+    pub fn rows(&self) -> &SparseRows {
         self.rows
     }
 
@@ -149,7 +149,7 @@ impl<'a> Reaching<'a> {
     /// What each row, as a load, does by what it moves: fᵀ K⁻¹ f = |L⁻¹ f|².
     pub fn works(&self, system: &System) -> Vec<f64> {
         let cut = system.cut_at_the_root();
-        let of_block = |(scratch, own): &mut (Scratch, Reduced), block: &Reached| {
+        let of_block = |(scratch, own): &mut (SolveScratch, ReducedBlock), block: &Reached| {
             let reached = (&block.nodes[..], &[][..]);
             system.reduce((self.rows, &block.rows), reached, &cut, scratch, own);
             own.squares()
@@ -196,7 +196,7 @@ impl<'a> Reaching<'a> {
         stage: &'static str,
         watch: Watch,
         place: impl Fn(usize, usize, usize) -> usize + Sync,
-    ) -> Result<Blocks, Cancelled> {
+    ) -> Result<ReadBlocks, Cancelled> {
         let cut = system.cut();
         let needed = kept.needed(system).above(&cut);
         let empty = |block: &Reached| Mutex::new(vec![0.0; block.rows.len() * kept.rows.count()]);
@@ -247,16 +247,16 @@ impl<'a> Reaching<'a> {
         cut: &Cut,
         system: &System,
         go_on: &(dyn Fn() -> Result<(), Cancelled> + Sync),
-    ) -> Result<Vec<Reduced>, Cancelled> {
-        let divide = |scratch: &mut Scratch, block: &Reached| {
+    ) -> Result<Vec<ReducedBlock>, Cancelled> {
+        let divide = |scratch: &mut SolveScratch, block: &Reached| {
             go_on()?;
-            let mut reduced = Reduced::default();
+            let mut reduced = ReducedBlock::default();
             let (nodes, above) = self.reached(block, cut, system);
             let rows = (self.rows, &block.rows[..]);
             system.reduce(rows, (&nodes, &above), cut, scratch, &mut reduced);
             Ok(reduced)
         };
-        let blocks = run.par_iter().map_init(Scratch::default, divide);
+        let blocks = run.par_iter().map_init(SolveScratch::default, divide);
         blocks.collect()
     }
 }

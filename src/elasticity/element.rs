@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use nalgebra::SMatrix;
 
 use super::bending::Bending;
-use super::material::Section;
+use super::material::ShellSection;
 use super::membrane::{Matrix3x9, Matrix9, Membrane};
 
 /// Stiffness of a facet: six degrees of freedom at each of three nodes.
@@ -29,7 +29,7 @@ pub struct Facet {
 impl Facet {
     /// Corners in space (m), counter-clockwise seen from outside.
     #[must_use]
-    pub fn new(corners: [DVec3; 3], section: &Section) -> Self {
+    pub fn new(corners: [DVec3; 3], section: &ShellSection) -> Self {
         let e1 = (corners[1] - corners[0]).normalize();
         let e3 = e1.cross(corners[2] - corners[0]).normalize();
         let frame = DMat3::from_cols(e1, e3.cross(e1), e3);
@@ -44,7 +44,7 @@ impl Facet {
 
     /// Stiffness in global degrees of freedom.
     #[must_use]
-    pub fn stiffness(&self, section: &Section) -> Matrix18 {
+    pub fn stiffness(&self, section: &ShellSection) -> Matrix18 {
         let mut local = Matrix18::zeros();
         scatter(&mut local, &self.membrane.stiffness(section), MEMBRANE);
         scatter(&mut local, &self.bending.stiffness(section), BENDING);

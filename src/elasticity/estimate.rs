@@ -105,7 +105,7 @@ impl Discretization {
 
 /// What one mesh says of some loads at some places.
 #[derive(Default)]
-pub struct Sample {
+pub struct ModelSample {
     /// Displacement under each load, along it (m).
     pub under: Vec<f64>,
     /// Strains (xx, yy, 2xy) at the places, load by load.
@@ -113,7 +113,7 @@ pub struct Sample {
     frames: Vec<super::observe::SiteFrame>,
 }
 
-impl Sample {
+impl ModelSample {
     /// Reads loads at places on the inside (m).
     ///
     /// # Errors
@@ -185,8 +185,8 @@ pub fn unknown(loads: usize, places: usize) -> Discretization {
 /// The error left in `fine`, from `coarse` with elements of twice the size.
 #[must_use]
 pub fn between(
-    coarse: &Sample,
-    fine: &Sample,
+    coarse: &ModelSample,
+    fine: &ModelSample,
     touches: &[Touch],
     places: &[DVec3],
 ) -> Discretization {
@@ -201,8 +201,8 @@ pub fn between(
 /// As [`between`] where what changes is `change` times what is left.
 #[must_use]
 pub fn left(
-    coarse: &Sample,
-    fine: &Sample,
+    coarse: &ModelSample,
+    fine: &ModelSample,
     touches: &[Touch],
     places: &[DVec3],
     change: f64,
@@ -221,7 +221,7 @@ pub fn left(
 /// The estimate from what is left of each displacement under its load (m), and of the strain by load and place.
 #[must_use]
 pub fn of(
-    fine: &Sample,
+    fine: &ModelSample,
     touches: &[Touch],
     places: &[DVec3],
     under: &[f64],
@@ -251,7 +251,7 @@ pub fn of(
 /// or over a twentieth of the middle load's where a load strains less: what presses on a support strains next to nothing,
 /// and what is off by as little is no share of anything that gauges read.
 fn strain_apart(
-    fine: &Sample,
+    fine: &ModelSample,
     touches: &[Touch],
     places: &[DVec3],
     off: impl Fn(usize, usize) -> [f64; 3],
@@ -287,7 +287,7 @@ fn strain_apart(
 /// What the strain of the place in the middle is off by over the strain there, both rms over the loads beyond the tip (NaN
 /// where there is none).
 fn readings_apart(
-    fine: &Sample,
+    fine: &ModelSample,
     touches: &[Touch],
     places: &[DVec3],
     off: impl Fn(usize, usize) -> [f64; 3],
@@ -331,7 +331,7 @@ mod tests {
         let shares = [0.1, 0.4, 0.2];
         let strain = |load: usize, i: usize| 1e-6 * ((1 + load) * (1 + 10 * i)) as f64;
         let of = |load: usize| (0..3).map(|i| [strain(load, i), 0.0, 0.0]).collect();
-        let fine = Sample {
+        let fine = ModelSample {
             under: vec![1e-3; 2],
             strains: (0..2).map(of).collect(),
             frames: Vec::new(),
@@ -366,7 +366,7 @@ mod tests {
         };
         let (touches, places) = ([touch; 3], [DVec3::X]);
         let strains = [1e-4, 1e-4, 1e-9];
-        let fine = Sample {
+        let fine = ModelSample {
             under: vec![1e-3; 3],
             strains: strains.map(|strain| vec![[strain, 0.0, 0.0]]).into(),
             frames: Vec::new(),
@@ -376,7 +376,7 @@ mod tests {
         let said = super::of(&fine, &touches, &places, &[0.0; 3], off).strain_percent;
         assert!((0.7..1.0).contains(&said), "{said}");
         // Where none strains anything there is no share.
-        let still = Sample {
+        let still = ModelSample {
             strains: vec![vec![[0.0; 3]]; 3],
             ..fine
         };

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::estimate::{self, Discretization, Sample};
+use super::estimate::{self, Discretization, ModelSample};
 use super::linearity::{Linearity, linearity};
 use super::load::Touch;
 use super::model::LoadCheck;
 use super::recover::facet_errors;
 use super::shell::check_held;
 use super::support::{DofSet, HeldPart, Support, geometry};
-use super::{ElasticError, Model as _, Section, ShellModel, scope};
+use super::{ElasticError, Model as _, ShellModel, ShellSection, scope};
 use crate::budget::{ElementBudget, Watch, report};
 use crate::mesh::TriMesh;
 use crate::mesh::canonical::Canonical;
@@ -26,7 +26,7 @@ pub struct ShellGround {
     part: Arc<TriMesh>,
     held: HeldPart,
     surface: Surface,
-    section: Section,
+    section: ShellSection,
     /// The canonical form; nothing where the part's own triangles are the elements.
     own: Option<Canonical>,
 }
@@ -79,7 +79,7 @@ impl ShellGround {
     #[must_use]
     pub fn new(
         part: &Arc<TriMesh>,
-        section: Section,
+        section: ShellSection,
         supports: &[Support],
         as_given: bool,
     ) -> Self {
@@ -230,22 +230,23 @@ impl ShellGround {
         let near = 2 * most <= 3 * aim.vertices;
         let mut vertices = if near { most } else { aim.vertices };
         // The fine mesh halves this one: a quarter of the vertices.
-        let mut coarse = Solved::new(self, self.even(vertices / 4), &touches, watch)?;
+        let mut coarse = SolvedMesh::new(self, self.even(vertices / 4), &touches, watch)?;
         let (mut models, mut solves) = (1, touches.len() as u64);
         let mut last = 0;
         loop {
             for pass in 0..if as_given { 0 } else { aim.passes } {
                 report(watch, "Laying elements", pass, aim.passes)?;
                 let remeshed = self.regraded(&coarse, vertices / 4);
-                coarse = Solved::new(self, remeshed, &touches, watch)?;
+                coarse = SolvedMesh::new(self, remeshed, &touches, watch)?;
                 models += 1;
                 solves += touches.len() as u64;
             }
             report(watch, "Laying elements", aim.passes, aim.passes)?;
-            let fine = Solved::new(self, self.halved(&coarse.remeshed), &touches, watch)?;
+            let fine = SolvedMesh::new(self, self.halved(&coarse.remeshed), &touches, watch)?;
             models += 1;
             solves += touches.len() as u64;
-            let sample = |s: &Solved| Sample::of(&s.model, &touches, &s.solutions, &places);
+            let sample =
+                |s: &SolvedMesh| ModelSample::of(&s.model, &touches, &s.solutions, &places);
             let estimate = estimate::between(&sample(&coarse), &sample(&fine), &touches, &places);
             if as_given {
                 // The part's own triangles are the model; the halved ones only say how good they are.
@@ -270,7 +271,7 @@ impl ShellGround {
     }
 
     /// Elements sized so that every one carries the same share of the error.
-    fn regraded(&self, solved: &Solved, vertices: usize) -> Remeshed {
+    fn regraded(&self, solved: &SolvedMesh, vertices: usize) -> Remeshed {
         let mesh = &solved.remeshed.mesh;
         let loads = (RECOVERED / mesh.triangles().len()).clamp(4, LOADS);
         let errors = facet_errors(&solved.model, &subsample(&solved.solutions, loads));
@@ -307,13 +308,13 @@ pub(super) fn even_size(area: f64, rims: f64, vertices: usize) -> f64 {
 }
 
 /// A mesh with its model and the sample loads solved on it.
-struct Solved {
+struct SolvedMesh {
     remeshed: Remeshed,
     model: ShellModel,
     solutions: Vec<Vec<f64>>,
 }
 
-impl Solved {
+impl SolvedMesh {
     fn new(
         ground: &ShellGround,
         remeshed: Remeshed,

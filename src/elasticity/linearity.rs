@@ -106,7 +106,8 @@ struct Second {
 impl Second {
     /// For several solutions at once: what belongs to a facet is built once for all of them.
     fn of_all(model: &ShellModel, solutions: &[Vec<f64>]) -> Vec<Self> {
-        let mut terms: Vec<Terms> = solutions.iter().map(|u| Terms::new(u)).collect();
+        let mut terms: Vec<LinearityTerms> =
+            solutions.iter().map(|u| LinearityTerms::new(u)).collect();
         let membrane = model.section.plane_stress() * model.section.thickness;
         let bending = model.section.plane_stress() * (model.section.thickness.powi(3) / 12.0);
         for (t, tri) in (0..).zip(model.mesh.triangles()) {
@@ -130,18 +131,18 @@ impl Second {
                 part.add(u, terms);
             }
         }
-        terms.into_iter().map(Terms::finish).collect()
+        terms.into_iter().map(LinearityTerms::finish).collect()
     }
 }
 
 /// Sums over the facets for one solution.
-struct Terms {
+struct LinearityTerms {
     cubic: f64,
     quartic: f64,
     force: Vec<f64>,
 }
 
-impl Terms {
+impl LinearityTerms {
     fn new(u: &[f64]) -> Self {
         Self {
             cubic: 0.0,
@@ -173,7 +174,7 @@ struct FacetPart {
 }
 
 impl FacetPart {
-    fn add(&self, u: &[f64], into: &mut Terms) {
+    fn add(&self, u: &[f64], into: &mut LinearityTerms) {
         let place = |i: usize| 6 * self.tri[i / 6] as usize + i % 6;
         let own = nalgebra::SVector::<f64, 18>::from_fn(|i, _| u[place(i)]);
         let moved = self.tri.map(|v| DVec3::from_slice(&u[6 * v as usize..]));

@@ -127,7 +127,7 @@ fn each_point(
     let grain = apart.min(touch.tip_radius / PIECES_PER_RADIUS);
     let index = mesh.index();
     let (at, _) = index.nearest(touch.position);
-    let tip = Tip {
+    let tip = StandingTip {
         centre: mesh.point(at),
         radius: touch.tip_radius,
         grain,
@@ -142,22 +142,22 @@ fn each_point(
 }
 
 /// A part of a facet, by the barycentric coordinates of its corners.
-type Piece = [[f64; 3]; 3];
-const WHOLE: Piece = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+type FacetPiece = [[f64; 3]; 3];
+const WHOLE: FacetPiece = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// A facet is split into this many pieces a side at once; larger ones are quartered first, down to this many: a tip
 /// covers so little of them that most quarters are left out.
 const AT_ONCE: f64 = 64.0;
 const OF_A_QUARTER: f64 = 8.0;
 
 /// A tip where it stands (m).
-struct Tip {
+struct StandingTip {
     centre: DVec3,
     radius: f64,
     /// How far from each other its points may be.
     grain: f64,
 }
 
-impl Tip {
+impl StandingTip {
     /// Which of the pieces of a row the tip may reach: all that it does, and few others. The row goes from `start` by
     /// `step` a piece, and is so `wide` (m).
     fn over_row(&self, start: DVec3, step: DVec3, wide: f64, count: usize) -> Range<usize> {
@@ -177,7 +177,7 @@ impl Tip {
     }
 
     /// The pieces that it may reach of a triangle split into `n` a side.
-    fn over(&self, ends: &[DVec3; 3], n: usize) -> impl Iterator<Item = Piece> {
+    fn over(&self, ends: &[DVec3; 3], n: usize) -> impl Iterator<Item = FacetPiece> {
         let [across, along] = [1, 2].map(|k| (ends[k] - ends[0]) / n as f64);
         (0..n).flat_map(move |i| {
             let start = ends[0] + across * i as f64;
@@ -192,8 +192,8 @@ impl Tip {
 fn integrate(
     mesh: &TriMesh,
     t: u32,
-    piece: &Piece,
-    tip: &Tip,
+    piece: &FacetPiece,
+    tip: &StandingTip,
     at_once: f64,
     tell: &mut impl FnMut(SurfacePoint, f64),
 ) {
@@ -233,17 +233,17 @@ fn integrate(
 }
 
 /// Coordinates in the facet of a point given by those in a piece of it.
-fn within(piece: &Piece, zeta: &[f64; 3]) -> [f64; 3] {
+fn within(piece: &FacetPiece, zeta: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| (0..3).map(|k| zeta[k] * piece[k][i]).sum())
 }
 
 /// The n² equal triangles of a split facet, by the barycentric coordinates of their corners.
-pub(super) fn pieces(n: usize) -> impl Iterator<Item = Piece> {
+pub(super) fn pieces(n: usize) -> impl Iterator<Item = FacetPiece> {
     (0..n).flat_map(move |i| row(n, i, 0..n - i))
 }
 
 /// Those of them in one row, at some places of it.
-fn row(n: usize, i: usize, places: Range<usize>) -> impl Iterator<Item = Piece> {
+fn row(n: usize, i: usize, places: Range<usize>) -> impl Iterator<Item = FacetPiece> {
     let at = move |i: usize, j: usize| {
         let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);
         [1.0 - u - v, u, v]
@@ -284,18 +284,18 @@ mod tests {
             for turn in 0..9 {
                 ends.rotate_left(1);
                 let share = f64::from(turn) / 8.0;
-                let tip = Tip {
+                let tip = StandingTip {
                     centre: ends[0].lerp(ends[1], share) * 0.9 + ends[2] * 0.1,
                     radius: 4.0,
                     grain: 1.0,
                 };
                 let point = |zeta: &[f64; 3]| -> DVec3 { (0..3).map(|i| ends[i] * zeta[i]).sum() };
-                let reached = |piece: &Piece| {
+                let reached = |piece: &FacetPiece| {
                     (0..3).any(|k| point(&piece[k]).distance(tip.centre) < tip.radius)
                 };
-                let looked_at: Vec<Piece> = tip.over(&ends, A_SIDE).collect();
-                let found: Vec<Piece> = looked_at.iter().copied().filter(reached).collect();
-                let all: Vec<Piece> = pieces(A_SIDE).filter(reached).collect();
+                let looked_at: Vec<FacetPiece> = tip.over(&ends, A_SIDE).collect();
+                let found: Vec<FacetPiece> = looked_at.iter().copied().filter(reached).collect();
+                let all: Vec<FacetPiece> = pieces(A_SIDE).filter(reached).collect();
                 assert_eq!(found, all, "{third:?} {turn}");
                 let few = 3 * all.len() + 6 * A_SIDE;
                 assert!(looked_at.len() < few, "{} {few}", looked_at.len());

@@ -37,14 +37,14 @@ impl Material {
 
 /// A shell of one thickness whose mid-surface is the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Section {
+pub struct ShellSection {
     /// What it is made of.
     pub material: Material,
     /// Thickness (m).
     pub thickness: f64,
 }
 
-impl Section {
+impl ShellSection {
     /// Plane-stress matrix (Pa) for strains (xx, yy, 2xy).
     #[must_use]
     pub fn plane_stress(&self) -> nalgebra::Matrix3<f64> {

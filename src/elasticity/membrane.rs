@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::material::Section;
+use super::material::ShellSection;
 
 /// Stiffness of a membrane: u, v and θz at each of three nodes.
 pub type Matrix9 = SMatrix<f64, 9, 9>;
@@ -97,7 +97,7 @@ impl Membrane {
 
     /// Stiffness (N/m, N, N·m by degree of freedom).
     #[must_use]
-    pub fn stiffness(&self, section: &Section) -> Matrix9 {
+    pub fn stiffness(&self, section: &ShellSection) -> Matrix9 {
         let elastic = section.plane_stress();
         let volume = self.area * section.thickness;
         let basic = self.basic.transpose() * elastic * self.basic * volume;

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DQuat, DVec3};
 
 use super::element::Facet;
-use super::material::Section;
-use super::rows::Rows;
+use super::material::ShellSection;
+use super::rows::SparseRows;
 use super::solver::BLOCK;
 use super::system::System;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -48,13 +48,13 @@ pub type SiteFrame = DMat3;
 /// Displacement and strain operators for a set of points on one face.
 pub struct Observer {
     /// Strain (xx, yy, 2xy) at the corners in use, from the degrees of freedom.
-    corners: Rows,
+    corners: SparseRows,
     /// Strain at the points in their frames, from the corners' strains.
-    strains: Rows,
+    strains: SparseRows,
     /// Displacement (x, y, z) of the face at the points, from the degrees of freedom.
-    displacements: Rows,
+    displacements: SparseRows,
     /// The same of the coarser model that displacements are carried on from.
-    coarser: Option<Rows>,
+    coarser: Option<SparseRows>,
     frames: Vec<SiteFrame>,
 }
 
@@ -62,7 +62,7 @@ impl Observer {
     /// On one face of a shell.
     pub(super) fn of_shell(
         mesh: &TriMesh,
-        section: &Section,
+        section: &ShellSection,
         system: &System,
         points: &[SurfacePoint],
         face: Face,
@@ -73,12 +73,12 @@ impl Observer {
             section,
             system,
             z,
-            rows: Rows::default(),
+            rows: SparseRows::default(),
             known: BTreeMap::new(),
             frames: Vec::new(),
         };
-        let mut strains = Rows::default();
-        let mut displacements = Rows::default();
+        let mut strains = SparseRows::default();
+        let mut displacements = SparseRows::default();
         let mut frames = Vec::with_capacity(points.len());
         for &at in points {
             let frame = tangent_frame(mesh.normal(at));
@@ -101,8 +101,12 @@ impl Observer {
     }
 
     /// From strain rows (xx, yy, 2xy a point) and displacement rows (x, y, z) on solved blocks.
-    pub(super) fn direct(strains: Rows, displacements: Rows, frames: Vec<SiteFrame>) -> Self {
-        let mut same = Rows::default();
+    pub(super) fn direct(
+        strains: SparseRows,
+        displacements: SparseRows,
+        frames: Vec<SiteFrame>,
+    ) -> Self {
+        let mut same = SparseRows::default();
         for row in 0..strains.count() as u32 {
             same.push([(row, 1.0)]);
         }
@@ -116,7 +120,7 @@ impl Observer {
     }
 
     /// The same, with the displacement rows of the coarser model that displacements are carried on from.
-    pub(super) fn with_coarser(self, coarser: Option<Rows>) -> Self {
+    pub(super) fn with_coarser(self, coarser: Option<SparseRows>) -> Self {
         Self { coarser, ..self }
     }
 
@@ -127,17 +131,17 @@ impl Observer {
     }
 
     /// The strain rows as one matrix on solved blocks, three (xx, yy, 2xy) a point.
-    pub(super) fn strain_rows(&self) -> Rows {
+    pub(super) fn strain_rows(&self) -> SparseRows {
         self.strains.times(&self.corners)
     }
 
     /// The displacement rows on solved blocks, three (x, y, z) a point.
-    pub(super) fn displacement_rows(&self) -> &Rows {
+    pub(super) fn displacement_rows(&self) -> &SparseRows {
         &self.displacements
     }
 
     /// As [`Self::displacement_rows`] of the coarser model, on blocks that it solved.
-    pub(super) fn coarser_rows(&self) -> Option<&Rows> {
+    pub(super) fn coarser_rows(&self) -> Option<&SparseRows> {
         self.coarser.as_ref()
     }
 
@@ -282,10 +286,10 @@ fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
 /// Builds the corner stage: one entry for each vertex in use, or for a facet's own corner at a crease.
 struct CornerRows<'m> {
     mesh: &'m TriMesh,
-    section: &'m Section,
+    section: &'m ShellSection,
     system: &'m System,
     z: f64,
-    rows: Rows,
+    rows: SparseRows,
     known: BTreeMap<(u32, Option<u32>), u32>,
     frames: Vec<SiteFrame>,
 }

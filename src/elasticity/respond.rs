@@ -6,10 +6,10 @@
 
 use rayon::prelude::*;
 
-use super::both::{Blocks, Reaching};
+use super::both::{Reaching, ReadBlocks};
 use super::load::{Push, Touch};
 use super::observe::Observer;
-use super::rows::Rows;
+use super::rows::SparseRows;
 use super::solver::BLOCK;
 use super::system::System;
 use super::{Model, observe};
@@ -17,7 +17,7 @@ use crate::budget::{Cancelled, Watch};
 
 /// Which side was solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum SolvedSide {
     /// One solve a load.
     Loads,
     /// One solve an output, by reciprocity.
@@ -50,11 +50,11 @@ pub struct Responses {
     loads: usize,
     rows: usize,
     /// Which side was solved for, all the way or above the cut: what took least.
-    pub side: Side,
+    pub side: SolvedSide,
     /// Right-hand sides solved, those of one side only below the cut too.
     pub solves: usize,
     /// Which loads (outputs) a block holds and, by rows, outputs × its loads (its outputs × all loads).
-    blocks: Blocks,
+    blocks: ReadBlocks,
     /// Where each output is when blocks are of outputs.
     found: Option<Vec<(u32, u32)>>,
     carried: Option<Box<Carried>>,
@@ -156,7 +156,7 @@ pub fn respond(
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn respond_from(
-    side: Side,
+    side: SolvedSide,
     model: &dyn Model,
     touches: &[impl Copy + Sync + Into<Push>],
     observer: &Observer,
@@ -167,7 +167,7 @@ pub fn respond_from(
 }
 
 fn by(
-    side: Option<Side>,
+    side: Option<SolvedSide>,
     model: &dyn Model,
     touches: &[impl Copy + Sync + Into<Push>],
     observer: &Observer,
@@ -176,7 +176,7 @@ fn by(
 ) -> Result<Responses, Cancelled> {
     let loads = touch_rows(model, touches);
     let outputs = output_rows(observer, reading);
-    let read: Read = &|solved, buffer, keep| {
+    let read: BlockReader = &|solved, buffer, keep| {
         match reading {
             Quantity::Strain | Quantity::StrainAndDisplacement => {
                 keep(observer.strain_into(solved, buffer));
@@ -199,7 +199,7 @@ fn by(
         && let (Some(from), Some(outputs)) = (model.coarser(), observer.coarser_rows())
     {
         let loads = touch_rows(from.model, touches);
-        let read: Read = &|solved, buffer, keep| {
+        let read: BlockReader = &|solved, buffer, keep| {
             buffer.resize(outputs.count() * BLOCK, 0.0);
             outputs.apply(solved, buffer);
             keep(buffer);
@@ -216,17 +216,17 @@ fn by(
 }
 
 /// Gives all outputs of a solved block, [`BLOCK`] values each, one part after the other, by way of a buffer.
-type Read<'a> = &'a (dyn Fn(&[f64], &mut Vec<f64>, &mut dyn FnMut(&[f64])) + Sync);
+type BlockReader<'a> = &'a (dyn Fn(&[f64], &mut Vec<f64>, &mut dyn FnMut(&[f64])) + Sync);
 
 const TOUCHES: &str = "Solving touches";
 const SITES: &str = "Solving sites";
 
 /// Outputs, as rows and as they are read of what is solved, under rows of loads, from the side that is named or the one that takes least.
 fn between(
-    side: Option<Side>,
+    side: Option<SolvedSide>,
     system: &System,
-    loads: &Rows,
-    (outputs, read): (&Rows, Read),
+    loads: &SparseRows,
+    (outputs, read): (&SparseRows, BlockReader),
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     let of = |rows| Reaching::new(system, rows);
@@ -234,23 +234,23 @@ fn between(
     let side = side.unwrap_or_else(|| {
         let costs = reached_loads.costs(&reached_outputs, system);
         let ways = [
-            (Side::Loads, costs.one),
-            (Side::Outputs, costs.other),
-            (Side::LoadsAbove, costs.one_above),
-            (Side::OutputsAbove, costs.other_above),
+            (SolvedSide::Loads, costs.one),
+            (SolvedSide::Outputs, costs.other),
+            (SolvedSide::LoadsAbove, costs.one_above),
+            (SolvedSide::OutputsAbove, costs.other_above),
         ];
         let least = ways.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        least.map_or(Side::Loads, |way| way.0)
+        least.map_or(SolvedSide::Loads, |way| way.0)
     });
     match side {
-        Side::Loads => by_loads(system, loads, (&reached_outputs, read), watch),
-        Side::Outputs => by_outputs(system, &reached_loads, outputs, watch),
-        Side::LoadsAbove => {
+        SolvedSide::Loads => by_loads(system, loads, (&reached_outputs, read), watch),
+        SolvedSide::Outputs => by_outputs(system, &reached_loads, outputs, watch),
+        SolvedSide::LoadsAbove => {
             let place = |load, width, output| output * width + load;
             let blocks = reached_loads.read(&reached_outputs, system, TOUCHES, watch, place)?;
             Ok(of_loads(side, loads, outputs, blocks))
         }
-        Side::OutputsAbove => {
+        SolvedSide::OutputsAbove => {
             let place = |output, _, load| output * loads.count() + load;
             let blocks = reached_outputs.read(&reached_loads, system, SITES, watch, place)?;
             Ok(of_outputs(side, loads, outputs, blocks))
@@ -260,8 +260,8 @@ fn between(
 
 fn by_loads(
     system: &System,
-    loads: &Rows,
-    (reached, read): (&Reaching, Read),
+    loads: &SparseRows,
+    (reached, read): (&Reaching, BlockReader),
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     let (outputs, needed) = (reached.rows(), reached.needed(system));
@@ -281,13 +281,13 @@ fn by_loads(
             (columns.to_vec(), values)
         },
     )?;
-    Ok(of_loads(Side::Loads, loads, outputs, blocks))
+    Ok(of_loads(SolvedSide::Loads, loads, outputs, blocks))
 }
 
 fn by_outputs(
     system: &System,
     reached: &Reaching,
-    outputs: &Rows,
+    outputs: &SparseRows,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     let (loads, needed) = (reached.rows(), reached.needed(system));
@@ -303,11 +303,16 @@ fn by_outputs(
             (rows.to_vec(), (0..rows.len()).flat_map(column).collect())
         },
     )?;
-    Ok(of_outputs(Side::Outputs, loads, outputs, blocks))
+    Ok(of_outputs(SolvedSide::Outputs, loads, outputs, blocks))
 }
 
 /// From blocks of loads, each outputs × its loads.
-fn of_loads(side: Side, loads: &Rows, outputs: &Rows, blocks: Blocks) -> Responses {
+fn of_loads(
+    side: SolvedSide,
+    loads: &SparseRows,
+    outputs: &SparseRows,
+    blocks: ReadBlocks,
+) -> Responses {
     Responses {
         loads: loads.count(),
         rows: outputs.count(),
@@ -320,7 +325,12 @@ fn of_loads(side: Side, loads: &Rows, outputs: &Rows, blocks: Blocks) -> Respons
 }
 
 /// From blocks of outputs, each its outputs × loads.
-fn of_outputs(side: Side, loads: &Rows, outputs: &Rows, blocks: Blocks) -> Responses {
+fn of_outputs(
+    side: SolvedSide,
+    loads: &SparseRows,
+    outputs: &SparseRows,
+    blocks: ReadBlocks,
+) -> Responses {
     let mut found = vec![(0, 0); outputs.count()];
     for (b, (rows, _)) in blocks.iter().enumerate() {
         for (k, &row) in rows.iter().enumerate() {
@@ -333,18 +343,18 @@ fn of_outputs(side: Side, loads: &Rows, outputs: &Rows, blocks: Blocks) -> Respo
     }
 }
 
-fn solves(side: Side, loads: &Rows, outputs: &Rows) -> usize {
+fn solves(side: SolvedSide, loads: &SparseRows, outputs: &SparseRows) -> usize {
     match side {
-        Side::Loads => loads.count(),
-        Side::Outputs => outputs.count(),
-        Side::LoadsAbove | Side::OutputsAbove => loads.count() + outputs.count(),
+        SolvedSide::Loads => loads.count(),
+        SolvedSide::Outputs => outputs.count(),
+        SolvedSide::LoadsAbove | SolvedSide::OutputsAbove => loads.count() + outputs.count(),
     }
 }
 
 /// Touches that ever other gauges are read under: their forces are laid on the model once, and each gauge is solved for.
 pub struct PressedModel<'a> {
     model: &'a dyn Model,
-    loads: Rows,
+    loads: SparseRows,
 }
 
 impl<'a> PressedModel<'a> {
@@ -401,7 +411,7 @@ pub fn gives_way(model: &dyn Model, touches: &[Touch]) -> Vec<f64> {
 }
 
 /// The touches' nodal forces as rows over solved blocks.
-fn touch_rows(model: &dyn Model, touches: &[impl Copy + Sync + Into<Push>]) -> Rows {
+fn touch_rows(model: &dyn Model, touches: &[impl Copy + Sync + Into<Push>]) -> SparseRows {
     let forces: Vec<Vec<(u32, f64)>> = touches
         .par_iter()
         .map(|&touch| {
@@ -413,34 +423,34 @@ fn touch_rows(model: &dyn Model, touches: &[impl Copy + Sync + Into<Push>]) -> R
                 .collect()
         })
         .collect();
-    let mut rows = Rows::default();
+    let mut rows = SparseRows::default();
     for row in forces {
         rows.push(row);
     }
     rows
 }
 
-pub(super) fn output_rows(observer: &Observer, reading: Quantity) -> Rows {
+pub(super) fn output_rows(observer: &Observer, reading: Quantity) -> SparseRows {
     let weighed = |(i, angle): (u32, f64), times: f64| {
         let weights = observe::along(angle);
         (0..3).map(move |k| (3 * i + k as u32, times * weights[k]))
     };
     let gauge = |angles: &[f64]| {
-        let mut along = Rows::default();
+        let mut along = SparseRows::default();
         for of in (0u32..).zip(angles.iter().copied()) {
             along.push(weighed(of, 1.0));
         }
         along.times(&observer.strain_rows())
     };
     let difference = |angles: &[f64], times: f64| {
-        let mut along = Rows::default();
+        let mut along = SparseRows::default();
         for (i, pair) in (0u32..).zip(angles.chunks_exact(2)) {
             let more = weighed((2 * i, pair[0]), times);
             along.push(more.chain(weighed((2 * i + 1, pair[1]), -times)));
         }
         along.times(&observer.strain_rows())
     };
-    let both = |mut first: Rows| {
+    let both = |mut first: SparseRows| {
         let displacement = observer.displacement_rows();
         for row in 0..displacement.count() {
             first.push(displacement.row(row).iter().copied());

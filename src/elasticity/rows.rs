@@ -6,12 +6,12 @@ use super::solver::BLOCK;
 
 /// A sparse matrix by rows, each a list of (column, weight).
 #[derive(Clone, Debug)]
-pub(super) struct Rows {
+pub(super) struct SparseRows {
     starts: Vec<usize>,
     entries: Vec<(u32, f64)>,
 }
 
-impl Default for Rows {
+impl Default for SparseRows {
     fn default() -> Self {
         Self {
             starts: vec![0],
@@ -20,7 +20,7 @@ impl Default for Rows {
     }
 }
 
-impl Rows {
+impl SparseRows {
     /// Appends a row, given as (column, weight).
     pub fn push(&mut self, row: impl IntoIterator<Item = (u32, f64)>) {
         self.entries.extend(row);

@@ -1,6 +1,6 @@
 //! Where the theory of thin shells itself is off, whatever the mesh: said, not hidden.
 
-use super::Section;
+use super::ShellSection;
 use crate::mesh::bends::bends;
 use crate::mesh::surface::Surface;
 use crate::mesh::{Edge, TriMesh};
@@ -14,7 +14,7 @@ const WORTH: f64 = 0.02;
 
 /// What a reader must know about a part of this section pressed by a tip of this radius (m).
 #[must_use]
-pub fn cautions(surface: &Surface, section: &Section, tip_radius: f64) -> Vec<String> {
+pub fn cautions(surface: &Surface, section: &ShellSection, tip_radius: f64) -> Vec<String> {
     let mesh = &surface.mesh;
     let t = section.thickness;
     let mm = |x: f64| x * 1000.0;
@@ -178,7 +178,7 @@ mod tests {
     fn notes(thickness: f64, tip: f64) -> Vec<String> {
         let (mesh, _) = LimbSpec::default().build().unwrap();
         let surface = Surface::new(&Arc::new(mesh), |_| false, |_| false);
-        let section = Section {
+        let section = ShellSection {
             material: Material {
                 youngs_modulus: 1.7e9,
                 poissons_ratio: 0.35,

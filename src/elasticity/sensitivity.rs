@@ -12,7 +12,7 @@ use super::Model;
 use super::load::{Push, Touch, pushed};
 use super::observe::Face;
 use super::respond::{Quantity, output_rows};
-use super::rows::Rows;
+use super::rows::SparseRows;
 use crate::budget::{Cancelled, Watch};
 use crate::gauge::Gauge;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -143,9 +143,9 @@ impl Sensitivity {
 }
 
 /// Mean strain over each gauge's grid, as rows over solved blocks.
-fn mean_rows(model: &dyn Model, gauges: &[Gauge], grid: [f64; 2]) -> Rows {
+fn mean_rows(model: &dyn Model, gauges: &[Gauge], grid: [f64; 2]) -> SparseRows {
     let (mut points, mut directions) = (Vec::<SurfacePoint>::new(), Vec::new());
-    let mut means = Rows::default();
+    let mut means = SparseRows::default();
     for gauge in gauges {
         let first = points.len() as u32;
         let places: Vec<(DVec3, f64)> = over_grid(gauge, grid).collect();

@@ -6,7 +6,7 @@ use super::DofSet;
 use super::element::Facet;
 use super::error::{ElasticError, range};
 use super::load::{NodalForces, Push, Touch, nodal_forces, pushed};
-use super::material::Section;
+use super::material::ShellSection;
 use super::model::{LoadCheck, Model};
 use super::observe::{Face, Observer};
 use super::solver::{BLOCK, FactorError, SymmetricMatrix};
@@ -21,7 +21,7 @@ pub struct ShellModel {
     /// The elements: facets of the mid-surface (m).
     pub mesh: Arc<TriMesh>,
     /// Material and thickness.
-    pub section: Section,
+    pub section: ShellSection,
     system: System,
 }
 
@@ -32,7 +32,7 @@ impl ShellModel {
     /// [`ElasticError`] for values outside their range, and for parts that are not held.
     pub fn new(
         mesh: &Arc<TriMesh>,
-        section: Section,
+        section: ShellSection,
         held: &[DofSet],
         watch: Watch,
     ) -> Result<Self, ElasticError> {
@@ -198,7 +198,7 @@ pub(super) fn by_dof(forces: &NodalForces) -> Vec<(usize, f64)> {
 ///
 /// # Errors
 /// [`ElasticError::Value`] naming the one that is not.
-pub fn check_section(section: &Section) -> Result<(), ElasticError> {
+pub fn check_section(section: &ShellSection) -> Result<(), ElasticError> {
     section.material.check()?;
     let thickness = section.thickness;
     range(
@@ -325,7 +325,7 @@ fn element_freedoms(tri: &[u32; 3]) -> [usize; 18] {
 }
 
 /// Element matrices on the rayon pool, added up in the order of the triangles.
-fn assemble(mesh: &TriMesh, section: &Section, unknowns: &[u32], into: &mut SymmetricMatrix) {
+fn assemble(mesh: &TriMesh, section: &ShellSection, unknowns: &[u32], into: &mut SymmetricMatrix) {
     const CHUNK: usize = 4096;
     for (c, chunk) in mesh.triangles().chunks(CHUNK).enumerate() {
         let elements: Vec<_> = (0..chunk.len())

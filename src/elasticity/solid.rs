@@ -38,8 +38,8 @@ use super::error::ElasticError;
 use super::load::{Push, Touch, pressure};
 use super::model::{Coarser, LoadCheck, Model};
 use super::observe::{Face, Observer, tangent_frame};
-use super::rows::Rows;
-use super::solver::{BLOCK, FactorError, Plan, SymmetricMatrix, bytes, check_bytes};
+use super::rows::SparseRows;
+use super::solver::{BLOCK, FactorError, FactorPlan, SymmetricMatrix, bytes, check_bytes};
 use super::system::{HELD, System, number_unknowns};
 use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
@@ -55,7 +55,7 @@ pub struct SolidModel {
     /// On elements of one order less, and the share of [`Coarser`].
     coarser: Option<(Box<Self>, f64)>,
     /// Displacements at the vertices of the surface, as rows over solved blocks.
-    vertices: Rows,
+    vertices: SparseRows,
     pieces: usize,
     /// For each facet of the surface, where a search for its element may begin.
     guesses: Vec<u32>,
@@ -91,7 +91,7 @@ impl SolidModel {
             grip,
             system,
             coarser: None,
-            vertices: Rows::default(),
+            vertices: SparseRows::default(),
             pieces,
             guesses: Vec::new(),
         };
@@ -143,9 +143,9 @@ impl SolidModel {
     }
 
     /// Rows x, y, z of the displacement at each point.
-    fn displacement_rows(&self, points: &[SurfacePoint]) -> Rows {
+    fn displacement_rows(&self, points: &[SurfacePoint]) -> SparseRows {
         let shapes: Vec<ShapeFunctions> = points.par_iter().map(|&at| self.shape(at)).collect();
-        let mut rows = Rows::default();
+        let mut rows = SparseRows::default();
         for shape in shapes {
             for axis in 0..3 {
                 let entries = shape.nodes.iter().zip(&shape.values);
@@ -156,9 +156,9 @@ impl SolidModel {
     }
 
     /// Rows xx, yy, 2xy of the strain at each point in its frame.
-    fn strain_rows(&self, points: &[SurfacePoint], frames: &[glam::DMat3]) -> Rows {
+    fn strain_rows(&self, points: &[SurfacePoint], frames: &[glam::DMat3]) -> SparseRows {
         let shapes: Vec<ShapeFunctions> = points.par_iter().map(|&at| self.shape(at)).collect();
-        let mut rows = Rows::default();
+        let mut rows = SparseRows::default();
         for (shape, frame) in shapes.iter().zip(frames) {
             let (t, s) = (frame.x_axis, frame.y_axis);
             for component in 0..3 {
@@ -350,8 +350,8 @@ fn neighbours(elements: &dyn Elements) -> Vec<Vec<u32>> {
 }
 
 /// What the factor of elements' stiffness will be.
-fn plan(elements: &dyn Elements) -> Result<Plan, FactorError> {
-    Plan::new(&neighbours(elements), &elements.elimination(), 3)
+fn plan(elements: &dyn Elements) -> Result<FactorPlan, FactorError> {
+    FactorPlan::new(&neighbours(elements), &elements.elimination(), 3)
 }
 
 /// The lower triangle's pattern: nodes that share an element are coupled.

@@ -27,7 +27,7 @@ use crate::memory;
 
 pub use self::cut::Cut;
 pub use self::matrix::{FactorError, Scaled, SymmetricMatrix, bytes, bytes_with};
-pub use self::reduced::{BLOCK, Reduced, Scratch, common};
+pub use self::reduced::{BLOCK, ReducedBlock, SolveScratch, common};
 
 /// L Lᵀ of the matrix scaled to a unit diagonal, its rows in the order of elimination.
 pub struct Factor {
@@ -47,7 +47,7 @@ pub struct Factor {
 
 /// Right-hand sides, then solutions, of one block: rows in the order of elimination, scaled, [`BLOCK`]
 /// columns side by side.
-pub struct Block {
+pub struct SolveBlock {
     /// Row-major, dimension × [`BLOCK`].
     pub rows: Vec<f64>,
     /// Supernodes with anything in their rows.
@@ -133,9 +133,9 @@ impl Factor {
     }
 
     /// An empty block.
-    pub fn block(&self) -> Block {
+    pub fn block(&self) -> SolveBlock {
         let l = self.supernodes().symbolic();
-        Block {
+        SolveBlock {
             rows: vec![0.0; self.dimension() * BLOCK],
             filled: vec![false; l.n_supernodes()],
             below: vec![0.0; self.tallest * BLOCK],
@@ -143,7 +143,7 @@ impl Factor {
     }
 
     /// Empties a block for the next right-hand sides.
-    pub fn clear(&self, block: &mut Block) {
+    pub fn clear(&self, block: &mut SolveBlock) {
         let symbolic = nodes(&self.symbolic);
         let (begins, ends) = (symbolic.supernode_begin(), symbolic.supernode_end());
         for (node, filled) in block.filled.iter_mut().enumerate() {
@@ -154,27 +154,27 @@ impl Factor {
     }
 
     /// Adds to a right-hand side: `row` as the matrix counts them.
-    pub fn load(&self, block: &mut Block, row: usize, column: usize, value: f64) {
+    pub fn load(&self, block: &mut SolveBlock, row: usize, column: usize, value: f64) {
         let at = self.order[row] as usize;
         block.rows[at * BLOCK + column] += value * self.scale[row];
         block.filled[self.supernode[at] as usize] = true;
     }
 
     /// As [`Self::load`] for a row in the order of elimination and a value that is scaled already.
-    pub fn load_place(&self, block: &mut Block, at: u32, column: usize, value: f64) {
+    pub fn load_place(&self, block: &mut SolveBlock, at: u32, column: usize, value: f64) {
         block.rows[at as usize * BLOCK + column] += value;
         block.filled[self.supernode[at as usize] as usize] = true;
     }
 
     /// Solves in place. Forward, only the supernodes that a load reaches do any work: loads that lie
     /// near each other, and so in the same branches of the elimination tree, should share a block.
-    pub fn solve(&self, block: &mut Block) {
+    pub fn solve(&self, block: &mut SolveBlock) {
         self.solve_for(|_| true, block);
     }
 
     /// As [`Self::solve`] for the rows of the supernodes that are needed, and of all above these, which are needed for them; the
     /// others hold nothing that means anything.
-    pub fn solve_for(&self, is_needed: impl Fn(usize) -> bool, block: &mut Block) {
+    pub fn solve_for(&self, is_needed: impl Fn(usize) -> bool, block: &mut SolveBlock) {
         let l = self.supernodes();
         let count = l.symbolic().n_supernodes();
         for s in 0..count {
@@ -196,8 +196,8 @@ impl Factor {
         (nodes, above): (&[u32], &[u32]),
         cut: &Cut,
         values: impl Iterator<Item = (u32, usize, f64)>,
-        scratch: &mut Scratch,
-        into: &mut Reduced,
+        scratch: &mut SolveScratch,
+        into: &mut ReducedBlock,
     ) {
         let l = self.supernodes();
         let begins = l.symbolic().supernode_begin();
@@ -228,10 +228,10 @@ impl Factor {
     }
 
     /// What right-hand sides that were reduced below a cut read of a block that is solved above it and divided below, where it
-    /// reaches `nodes` ([`Reduced::read`]).
+    /// reaches `nodes` ([`ReducedBlock::read`]).
     pub fn read(
         &self,
-        reduced: &Reduced,
+        reduced: &ReducedBlock,
         (solved, nodes): (&[f64], &[u32]),
         gathered: &mut Vec<f64>,
         into: &mut [f64],
@@ -308,7 +308,7 @@ impl Factor {
         self.values.len() as f64
     }
 
-    fn forward(&self, l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
+    fn forward(&self, l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut SolveBlock) {
         let node = l.supernode(s);
         let own = &mut block.rows[node.start() * BLOCK..][..node.val().ncols() * BLOCK];
         let below = divide(node, own, &mut block.below);
@@ -345,7 +345,7 @@ fn divide<'b>(
     below
 }
 
-fn backward(l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
+fn backward(l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut SolveBlock) {
     let node = l.supernode(s);
     let columns = node.val().ncols();
     let (top, bottom) = node.val().split_at_row(columns);
@@ -382,7 +382,7 @@ pub fn check_bytes(bytes: f64) -> Result<(), FactorError> {
 
 /// What a factor will be, found on nodes that have several unknowns each: much quicker than on the unknowns, and as
 /// good an order.
-pub struct Plan {
+pub struct FactorPlan {
     /// How many unknowns the nodes have.
     pub unknowns: f64,
     /// Entries of the factor.
@@ -393,7 +393,7 @@ pub struct Plan {
     pub multiplications: f64,
 }
 
-impl Plan {
+impl FactorPlan {
     /// Of nodes coupled with those in their lists (rising, themselves among them), with `each` unknowns, eliminated in
     /// this order.
     ///

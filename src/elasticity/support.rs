@@ -108,9 +108,9 @@ pub fn geometry(part: &Arc<TriMesh>, supports: &[Support]) -> (Arc<TriMesh>, Vec
 }
 
 /// Supports that a vertex belongs to, one bit each.
-type Members = u128;
+type SupportBits = u128;
 /// The most supports a part may have.
-pub const MOST: usize = Members::BITS as usize;
+pub const MOST: usize = SupportBits::BITS as usize;
 
 /// A part with its supports, cut so that what is held has edges of the mesh for its border.
 #[derive(Clone, Debug)]
@@ -121,7 +121,7 @@ pub struct HeldPart {
     pub held: Vec<DofSet>,
     /// For each vertex the supports it belongs to: what lies between vertices is held by a support only
     /// when all of them belong to that very one.
-    members: Vec<Members>,
+    members: Vec<SupportBits>,
     kinds: Vec<DofSet>,
 }
 
@@ -158,7 +158,7 @@ impl HeldPart {
         Self::with(Arc::clone(part), members(part, supports), supports)
     }
 
-    fn with(mesh: Arc<TriMesh>, members: Vec<Members>, supports: &[Support]) -> Self {
+    fn with(mesh: Arc<TriMesh>, members: Vec<SupportBits>, supports: &[Support]) -> Self {
         let kinds: Vec<DofSet> = supports.iter().map(|s| s.held).collect();
         Self {
             held: members.iter().map(|&m| together(m, &kinds)).collect(),
@@ -177,7 +177,9 @@ impl HeldPart {
             .into_iter()
             .zip(at.barycentric)
             .filter(|(_, w)| *w > 1e-7)
-            .fold(Members::MAX, |all, (v, _)| all & self.members[v as usize]);
+            .fold(SupportBits::MAX, |all, (v, _)| {
+                all & self.members[v as usize]
+            });
         together(common, &self.kinds)
     }
 
@@ -237,7 +239,7 @@ impl HeldPart {
     }
 
     /// The supports that a vertex belongs to and none of its neighbours does.
-    fn alone(&self, vertex: u32) -> Members {
+    fn alone(&self, vertex: u32) -> SupportBits {
         let own = self.members[vertex as usize];
         let near = self.mesh.vertex_triangles()[vertex as usize]
             .iter()
@@ -249,7 +251,7 @@ impl HeldPart {
 }
 
 /// What several supports hold together.
-fn together(members: Members, kinds: &[DofSet]) -> DofSet {
+fn together(members: SupportBits, kinds: &[DofSet]) -> DofSet {
     let mine = kinds
         .iter()
         .enumerate()
@@ -263,9 +265,9 @@ fn slack(mesh: &TriMesh) -> f64 {
 }
 
 /// The supports that each vertex of the part belongs to.
-fn members(mesh: &TriMesh, supports: &[Support]) -> Vec<Members> {
+fn members(mesh: &TriMesh, supports: &[Support]) -> Vec<SupportBits> {
     let slack = slack(mesh);
-    let mut members: Vec<Members> = mesh
+    let mut members: Vec<SupportBits> = mesh
         .positions()
         .iter()
         .map(|&p| in_boxes(p, supports, slack))
@@ -281,7 +283,7 @@ fn members(mesh: &TriMesh, supports: &[Support]) -> Vec<Members> {
 }
 
 /// The boxes that a point lies in.
-fn in_boxes(p: DVec3, supports: &[Support], slack: f64) -> Members {
+fn in_boxes(p: DVec3, supports: &[Support], slack: f64) -> SupportBits {
     let boxes = supports.iter().enumerate().take(MOST);
     boxes.fold(0, |members, (k, s)| match s.region {
         HeldRegion::Box(held) if held.contains(p, slack) => members | 1 << k,

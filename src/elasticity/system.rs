@@ -4,9 +4,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::rows::Rows;
+use super::rows::SparseRows;
 use super::solver::{
-    BLOCK, Block, Cut, Factor, FactorError, Reduced, Scaled, Scratch, SymmetricMatrix, bytes_with,
+    BLOCK, Cut, Factor, FactorError, ReducedBlock, Scaled, SolveBlock, SolveScratch,
+    SymmetricMatrix, bytes_with,
 };
 use super::spare::Spare;
 use crate::budget::{Cancelled, Watch, Work, report};
@@ -159,7 +160,7 @@ impl System {
     }
 
     /// One column of a solved block, by degree of freedom.
-    fn column(&self, block: &Block, column: usize) -> Vec<f64> {
+    fn column(&self, block: &SolveBlock, column: usize) -> Vec<f64> {
         self.unknowns
             .iter()
             .map(|&u| {
@@ -172,7 +173,7 @@ impl System {
             .collect()
     }
 
-    fn load(&self, block: &mut Block, column: usize, loads: &[(usize, f64)]) {
+    fn load(&self, block: &mut SolveBlock, column: usize, loads: &[(usize, f64)]) {
         for &(dof, force) in loads {
             let unknown = self.unknowns[dof];
             if unknown != HELD {
@@ -211,7 +212,7 @@ impl System {
     /// which does not depend on the threads.
     pub(super) fn solve_rows<T: Send>(
         &self,
-        loads: &Rows,
+        loads: &SparseRows,
         needed: Option<&Needed>,
         stage: &'static str,
         watch: Watch,
@@ -238,11 +239,11 @@ impl System {
     /// there, with the rows above on which they leave something ([`Factor::reduce`]).
     pub(super) fn reduce(
         &self,
-        (loads, rows): (&Rows, &[u32]),
+        (loads, rows): (&SparseRows, &[u32]),
         reached: (&[u32], &[u32]),
         cut: &Cut,
-        scratch: &mut Scratch,
-        into: &mut Reduced,
+        scratch: &mut SolveScratch,
+        into: &mut ReducedBlock,
     ) {
         let values = rows.iter().enumerate().flat_map(|(column, &row)| {
             let row = loads.row(row as usize).iter();
@@ -260,7 +261,7 @@ impl System {
     }
 
     /// An empty block.
-    pub(super) fn block(&self) -> Block {
+    pub(super) fn block(&self) -> SolveBlock {
         self.factor.block()
     }
 
@@ -268,9 +269,9 @@ impl System {
     /// with the lower triangle divided out.
     pub(super) fn solve_block(
         &self,
-        (loads, rows): (&Rows, &[u32]),
+        (loads, rows): (&SparseRows, &[u32]),
         is_needed: impl Fn(usize) -> bool,
-        block: &mut Block,
+        block: &mut SolveBlock,
     ) {
         self.factor.clear(block);
         for (column, &row) in rows.iter().enumerate() {
@@ -285,7 +286,7 @@ impl System {
     /// What is read of a block that is solved above a cut ([`Factor::read`]).
     pub(super) fn read(
         &self,
-        reduced: &Reduced,
+        reduced: &ReducedBlock,
         solved: (&[f64], &[u32]),
         gathered: &mut Vec<f64>,
         into: &mut [f64],

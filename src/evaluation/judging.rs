@@ -43,19 +43,19 @@ pub enum Judging {
     #[default]
     Svr,
     /// By matching, under touches of these forces.
-    Matching(Forces),
+    Matching(JudgingForces),
 }
 
 /// How hard touches come that sets are judged by.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Forces {
+pub struct JudgingForces {
     /// N, rising; at least one.
     pub judged_n: Vec<f64>,
     /// The hardest press that the estimator thinks possible (N).
     pub most_n: f64,
 }
 
-impl Forces {
+impl JudgingForces {
     /// Which of them sets are compared at: the middle one, of two in the middle the harder.
     #[must_use]
     pub fn middle(&self) -> usize {
@@ -78,7 +78,7 @@ impl Judging {
     pub fn at_middle(&self) -> Self {
         match self {
             Self::Svr => Self::Svr,
-            Self::Matching(forces) => Self::Matching(Forces {
+            Self::Matching(forces) => Self::Matching(JudgingForces {
                 judged_n: self.middle_n().into_iter().collect(),
                 ..forces.clone()
             }),
@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn sets_are_compared_at_the_force_in_the_middle() {
         let middle = |judged_n: &[f64]| {
-            let forces = Forces {
+            let forces = JudgingForces {
                 judged_n: judged_n.to_vec(),
                 most_n: 60.0,
             };
@@ -113,7 +113,7 @@ mod tests {
         assert_eq!(middle(&[3.0, 10.0, 25.0]), Some(10.0));
         assert_eq!(Judging::Svr.middle_n(), None);
         let forces = |judged_n: &[f64]| {
-            Judging::Matching(Forces {
+            Judging::Matching(JudgingForces {
                 judged_n: judged_n.to_vec(),
                 most_n: 60.0,
             })

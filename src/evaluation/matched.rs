@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::judging::EstimatorKind;
-use super::rows::{EvaluationRow, JudgedSet, TouchRegion, quoted};
+use super::rows::{EvaluationRow, JudgedSet, NamedRegion, quoted};
 use super::set_id::SetId;
 use crate::statistics::mean;
 
@@ -68,13 +68,13 @@ impl Matched {
     }
 
     /// A row for all touches, and one for each region that has any.
-    pub(super) fn rows(&self, regions: &[TouchRegion]) -> Vec<MatchedRow> {
+    pub(super) fn rows(&self, regions: &[NamedRegion]) -> Vec<MatchedRow> {
         let (regions, judged) = (quoted(regions, self.errors.len()), self.judged());
         let row = |region| self.row(region, judged.row(region));
         regions.iter().map(row).collect()
     }
 
-    fn row(&self, region: &TouchRegion, all: EvaluationRow) -> MatchedRow {
+    fn row(&self, region: &NamedRegion, all: EvaluationRow) -> MatchedRow {
         let blind = region.within(&self.blind);
         let errors = region.within(&self.errors).into_iter().zip(&blind);
         let sighted: Vec<f64> = errors.filter_map(|(e, b)| (!b).then_some(e)).collect();
@@ -98,7 +98,7 @@ impl Matched {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::{Chooser, EVERYWHERE, Evaluation, Forces, Judging};
+    use crate::evaluation::{Chooser, EVERYWHERE, Evaluation, Judging, JudgingForces};
     use crate::placement::SelectorKind;
 
     fn pca_qr(sensors: usize) -> SetId {
@@ -116,8 +116,8 @@ mod tests {
         }
     }
 
-    fn half() -> TouchRegion {
-        TouchRegion {
+    fn half() -> NamedRegion {
+        NamedRegion {
             name: "half".into(),
             contains: vec![true, true, false, false],
         }
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn sets_are_compared_at_the_force_in_the_middle_in_any_regions() {
-        let judging = Judging::Matching(Forces {
+        let judging = Judging::Matching(JudgingForces {
             judged_n: vec![3.0, 10.0, 25.0],
             most_n: 60.0,
         });

@@ -8,14 +8,14 @@ use crate::statistics::{mean, quantile};
 
 /// A named part of the touches.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TouchRegion {
+pub struct NamedRegion {
     /// For people.
     pub name: String,
     /// One value a test touch.
     pub contains: Vec<bool>,
 }
 
-impl TouchRegion {
+impl NamedRegion {
     /// Of one value a test touch, those inside.
     pub(super) fn within<T: Copy>(&self, values: &[T]) -> Vec<T> {
         (values.iter().zip(&self.contains))
@@ -69,12 +69,12 @@ pub struct JudgedSet {
 
 impl JudgedSet {
     /// A row for all touches, and one for each region that has any.
-    pub(super) fn rows(&self, regions: &[TouchRegion]) -> Vec<EvaluationRow> {
+    pub(super) fn rows(&self, regions: &[NamedRegion]) -> Vec<EvaluationRow> {
         let regions = quoted(regions, self.drawn.len());
         regions.iter().map(|region| self.row(region)).collect()
     }
 
-    pub(super) fn row(&self, region: &TouchRegion) -> EvaluationRow {
+    pub(super) fn row(&self, region: &NamedRegion) -> EvaluationRow {
         let mut drawn = region.within(&self.drawn);
         drawn.sort_by(f64::total_cmp);
         let share = |q: f64| quantile(&drawn, q).unwrap_or(f64::NAN);
@@ -93,8 +93,8 @@ impl JudgedSet {
 }
 
 /// What errors of so many touches are quoted for: all of them, and each region that has any.
-pub(super) fn quoted(regions: &[TouchRegion], touches: usize) -> Vec<TouchRegion> {
-    let everywhere = TouchRegion {
+pub(super) fn quoted(regions: &[NamedRegion], touches: usize) -> Vec<NamedRegion> {
+    let everywhere = NamedRegion {
         name: EVERYWHERE.into(),
         contains: vec![true; touches],
     };

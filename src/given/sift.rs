@@ -11,14 +11,14 @@ const STEEPEST: f64 = 30.0;
 
 /// A table of given points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Table {
+pub enum GivenTable {
     /// Touches.
     Touches,
     /// Gauges.
     Sites,
 }
 
-impl Table {
+impl GivenTable {
     /// One row of it in words.
     #[must_use]
     pub fn row(self) -> &'static str {
@@ -40,9 +40,9 @@ impl Table {
 
 /// A row that cannot be answered, and why.
 #[derive(Debug)]
-pub struct LeftOut {
+pub struct LeftOutRow {
     /// The table it stands in.
-    pub table: Table,
+    pub table: GivenTable,
     /// Counted from 0.
     pub row: usize,
     /// The error that answering it would be.
@@ -57,7 +57,7 @@ pub struct Sifted {
     /// Rows of sites that are left, counted from 0.
     pub sites: Vec<usize>,
     /// What was left out, and why.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<LeftOutRow>,
     /// How far each row lies from the part (m).
     pub touch_distances: Vec<f64>,
     /// How far each site lies from the part (m).
@@ -82,7 +82,7 @@ pub fn sift(part: &TriMesh, touches: &[Touch], sites: &[GivenSite]) -> Sifted {
             if beside { angle_out(part, site) } else { 0.0 }
         })
         .collect();
-    let far = |table: Table, row: usize, distance: f64| {
+    let far = |table: GivenTable, row: usize, distance: f64| {
         (distance > OFF * near.size).then(|| near.off(table.row(), row, distance))
     };
     let across = |row: usize| {
@@ -93,11 +93,11 @@ pub fn sift(part: &TriMesh, touches: &[Touch], sites: &[GivenSite]) -> Sifted {
         })
     };
     let mut left_out = Vec::new();
-    let touches = kept(Table::Touches, touches.len(), &mut left_out, |row| {
-        far(Table::Touches, row, touch_distances[row])
+    let touches = kept(GivenTable::Touches, touches.len(), &mut left_out, |row| {
+        far(GivenTable::Touches, row, touch_distances[row])
     });
-    let sites = kept(Table::Sites, sites.len(), &mut left_out, |row| {
-        far(Table::Sites, row, site_distances[row]).or_else(|| across(row))
+    let sites = kept(GivenTable::Sites, sites.len(), &mut left_out, |row| {
+        far(GivenTable::Sites, row, site_distances[row]).or_else(|| across(row))
     });
     Sifted {
         touches,
@@ -127,8 +127,8 @@ impl Sifted {
     /// [`DesignError::NothingLeft`].
     pub fn check(&self) -> Result<(), DesignError> {
         for (table, left, distances) in [
-            (Table::Touches, &self.touches, &self.touch_distances),
-            (Table::Sites, &self.sites, &self.site_distances),
+            (GivenTable::Touches, &self.touches, &self.touch_distances),
+            (GivenTable::Sites, &self.sites, &self.site_distances),
         ] {
             if left.is_empty() {
                 return Err(DesignError::NothingLeft {
@@ -143,16 +143,16 @@ impl Sifted {
 
 /// The rows of a table with nothing against them.
 fn kept(
-    table: Table,
+    table: GivenTable,
     rows: usize,
-    left_out: &mut Vec<LeftOut>,
+    left_out: &mut Vec<LeftOutRow>,
     against: impl Fn(usize) -> Option<DesignError>,
 ) -> Vec<usize> {
     let mut kept = Vec::with_capacity(rows);
     for row in 0..rows {
         match against(row) {
             None => kept.push(row),
-            Some(why) => left_out.push(LeftOut { table, row, why }),
+            Some(why) => left_out.push(LeftOutRow { table, row, why }),
         }
     }
     kept
@@ -245,8 +245,8 @@ mod tests {
             let rows = sifted.left_out.iter().filter(move |l| l.table == table);
             rows.map(|l| l.row).collect::<Vec<_>>()
         };
-        assert_eq!(rows(Table::Touches), [1, 2]);
-        assert_eq!(rows(Table::Sites), [1, 2, 3, 4]);
+        assert_eq!(rows(GivenTable::Touches), [1, 2]);
+        assert_eq!(rows(GivenTable::Sites), [1, 2, 3, 4]);
         assert!(sifted.check().is_ok());
         let none = sift(&corner(), &[touch(1.0)], &sites).check().unwrap_err();
         assert!(none.to_string().contains("1 touches"), "{none}");

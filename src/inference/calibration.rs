@@ -37,11 +37,11 @@ use super::drawn::{
     AsDrawn, AsGlued, GluingCovariance, covariance, gluing_covariance, upper_triangle,
 };
 use super::map::{ResponseMap, Slope};
-use super::matching::Errors;
+use super::matching::ReadingErrors;
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::Uncertainty;
 
-/// A touch that was put where it was asked for, or nearly: see [`crate::uncertainty::Pressing`].
+/// A touch that was put where it was asked for, or nearly: see [`crate::uncertainty::HandPressing`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownPress {
     /// Where it was asked for.
@@ -62,7 +62,7 @@ pub struct Calibration {
     pub doubts: Vec<GluingCovariance>,
     /// Standard deviation of each gain.
     pub deviations: Vec<f64>,
-    /// What is still off beside that, over the reading; see [`Errors::relative`].
+    /// What is still off beside that, over the reading; see [`ReadingErrors::relative`].
     pub relative: f64,
     /// Known touches it was learned from.
     pub touches: usize,
@@ -130,7 +130,7 @@ struct Fitted {
     glued: Vec<AsGlued>,
     relative: f64,
     /// Nothing where numbers overflow.
-    fit: Option<Fit>,
+    fit: Option<CalibrationFit>,
 }
 
 /// By the noise of each press (strain, a channel each).
@@ -141,8 +141,8 @@ fn fitted(drawn: &AsDrawn, known: &[&KnownPress], noise: &[f64], off: &Uncertain
         fit: None,
     };
     for _ in 0..TURNS {
-        let presses: Vec<Press> = (known.iter())
-            .map(|k| Press::new(drawn, k, &fitted.glued, off))
+        let presses: Vec<ComparedPress> = (known.iter())
+            .map(|k| ComparedPress::new(drawn, k, &fitted.glued, off))
             .collect();
         let least = Least {
             presses: &presses,
@@ -163,7 +163,7 @@ fn fitted(drawn: &AsDrawn, known: &[&KnownPress], noise: &[f64], off: &Uncertain
 const PER_GAUGE: usize = 4;
 
 /// One press, ready to be compared.
-struct Press {
+struct ComparedPress {
     /// What is expected, of channels that were not read.
     reading: Vec<f64>,
     read: Vec<bool>,
@@ -174,7 +174,7 @@ struct Press {
     moved: DMatrix<f64>,
 }
 
-impl Press {
+impl ComparedPress {
     fn new(drawn: &AsDrawn, known: &KnownPress, glued: &[AsGlued], off: &Uncertainty) -> Self {
         let basis = drawn.basis(known.at);
         let pairs = known.reading.iter().zip(&basis);
@@ -212,7 +212,7 @@ impl Press {
     }
 
     /// Covariance of its residuals, factored.
-    fn covariance(&self, errors: &Errors, drift: f64) -> Option<Cholesky<f64, Dyn>> {
+    fn covariance(&self, errors: &ReadingErrors, drift: f64) -> Option<Cholesky<f64, Dyn>> {
         let weights = errors.weights(&self.reading, &self.read);
         let mut covariance = &self.moved * self.moved.transpose();
         covariance.add_scalar_mut(drift * drift);
@@ -260,13 +260,13 @@ impl Press {
 
 /// The least squares of all presses.
 struct Least<'a> {
-    presses: &'a [Press],
+    presses: &'a [ComparedPress],
     noise: &'a [f64],
     off: &'a Uncertainty,
 }
 
 /// What they say.
-struct Fit {
+struct CalibrationFit {
     /// Of θ - θ₀, channel by channel, and of the common factor.
     found: DVector<f64>,
     /// The normal matrix.
@@ -277,10 +277,10 @@ struct Fit {
 
 impl Least<'_> {
     /// Solves with a share of the readings that the model leaves; nothing where numbers overflow.
-    fn fit(&self, relative: f64) -> Option<Fit> {
-        let errors = Errors {
+    fn fit(&self, relative: f64) -> Option<CalibrationFit> {
+        let errors = ReadingErrors {
             relative,
-            ..Errors::of_noises(self.noise)
+            ..ReadingErrors::of_noises(self.noise)
         };
         let mut normal = DMatrix::from_diagonal(&self.prior());
         let mut right = DVector::zeros(normal.nrows());
@@ -293,7 +293,7 @@ impl Least<'_> {
         let found = normal.solve(&right);
         squares -= found.dot(&right);
         let sound = squares.is_finite() && found.iter().all(|v| v.is_finite());
-        sound.then_some(Fit {
+        sound.then_some(CalibrationFit {
             found,
             normal,
             squares,
@@ -331,7 +331,7 @@ impl Least<'_> {
     }
 }
 
-impl Fit {
+impl CalibrationFit {
     /// How each gauge is glued, with the factor that all share.
     fn glued(&self) -> Vec<AsGlued> {
         let common = 1.0 + self.found[self.found.len() - 1];

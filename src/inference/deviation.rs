@@ -80,7 +80,7 @@ pub struct Nuisance {
 
 /// What is known of a touch beside its place and how hard it presses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct About {
+pub(super) struct TouchDoubts {
     /// Force along the surface over the one that presses.
     pub aside: DVec3,
     /// How much larger the tip is than it was said to be (m).
@@ -136,7 +136,7 @@ impl Nuisances {
     }
 
     /// What one newton reads at a place, beside what it presses, of a touch about which so much is known (strain).
-    pub(super) fn reading(&self, about: &About, at: SurfacePoint) -> Vec<f64> {
+    pub(super) fn reading(&self, about: &TouchDoubts, at: SurfacePoint) -> Vec<f64> {
         let mut slope = Slope::zero(self.channels());
         self.add(about, at, &mut slope);
         slope.reading
@@ -150,7 +150,7 @@ impl Nuisances {
 
     /// Adds to what one newton reads at a place, and how that changes over the surface, what it reads of a touch about
     /// which so much is known.
-    pub(super) fn add(&self, about: &About, at: SurfacePoint, slope: &mut Slope) {
+    pub(super) fn add(&self, about: &TouchDoubts, at: SurfacePoint, slope: &mut Slope) {
         let tip = self.tip.iter().map(|tip| (about.tip, &**tip));
         let axes = self.axes.iter();
         let pushed = axes.flat_map(|axes| about.aside.to_array().into_iter().zip(&**axes));

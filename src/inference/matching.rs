@@ -29,12 +29,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::deviation::About;
+use super::deviation::TouchDoubts;
 use super::map::{LANES, ResponseMap};
 use super::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
 
-pub use self::errors::Errors;
+pub use self::errors::ReadingErrors;
 
 use self::weighed::Observation;
 
@@ -66,14 +66,14 @@ pub struct Contact {
 
 impl Contact {
     /// What is known of it beside its place and how hard it presses. What was found of the tip is found again.
-    pub(super) fn about(&self) -> About {
+    pub(super) fn about(&self) -> TouchDoubts {
         if self.force > 0.0 {
-            About {
+            TouchDoubts {
                 aside: self.drag / self.force,
                 tip: 0.0,
             }
         } else {
-            About::default()
+            TouchDoubts::default()
         }
     }
 
@@ -101,7 +101,7 @@ pub struct Matching {
     /// What gauges read of a newton anywhere.
     pub map: Arc<ResponseMap>,
     /// What is known of the readings' errors.
-    pub errors: Errors,
+    pub errors: ReadingErrors,
     /// Channels that are trusted.
     pub used: Vec<bool>,
     /// The largest force that anybody presses with (N).
@@ -114,7 +114,7 @@ pub struct Matching {
 impl Matching {
     /// All channels trusted. `most_force` is the largest force that anybody presses with (N).
     #[must_use]
-    pub fn new(map: Arc<ResponseMap>, errors: Errors, most_force: f64) -> Self {
+    pub fn new(map: Arc<ResponseMap>, errors: ReadingErrors, most_force: f64) -> Self {
         Self {
             used: vec![true; map.channels()],
             scores: vec![0.0; map.templates.len() / map.channels().max(1)],
@@ -211,10 +211,10 @@ mod tests {
     fn what_is_no_reading_ends_nothing() {
         let [map, gluing_deviation] = maps();
         for gluing_deviation in [None, Some(gluing_deviation)] {
-            let errors = Errors {
+            let errors = ReadingErrors {
                 deviations: gluing_deviation.map(Deviations::of_gluing),
                 drift: 0.5e-6,
-                ..Errors::of_noise(1e-6, CHANNELS)
+                ..ReadingErrors::of_noise(1e-6, CHANNELS)
             };
             let mut matching = Matching::new(Arc::clone(&map), errors, 50.0);
             for bad in [f64::NAN, f64::INFINITY, -1e300, 1e3] {
@@ -237,9 +237,9 @@ mod tests {
     fn a_stiffness_that_is_off_is_a_force_that_is_off() {
         let [map, _] = maps();
         let found = |stiffness: f64| {
-            let errors = Errors {
+            let errors = ReadingErrors {
                 stiffness,
-                ..Errors::of_noise(1e-7, CHANNELS)
+                ..ReadingErrors::of_noise(1e-7, CHANNELS)
             };
             let g: Vec<f64> = map.node(1).iter().map(|g| 20.0 * g).collect();
             Matching::new(Arc::clone(&map), errors, 60.0).find(&g)

@@ -10,7 +10,7 @@ use glam::DVec3;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dataset::SignalMatrix;
-use crate::placement::expected_error::{Knowledge, SiteSignal, Template, templates};
+use crate::placement::expected_error::{SignalKnowledge, SiteSignal, Template, templates};
 
 /// Matches readings of some sites to those of touches that are known.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct MeasuredMatching {
 }
 
 /// What a template makes of a reading.
-struct Fit {
+struct TemplateFit {
     /// Of its likelihood, over the surroundings.
     log: f64,
     /// Where the touch is thought to be there (mm).
@@ -36,7 +36,7 @@ const TURNS: usize = 2;
 impl MeasuredMatching {
     /// From the signals (sites × touches) of touches at positions (mm).
     #[must_use]
-    pub fn new(x: &SignalMatrix, targets: &[[f64; 3]], known: &Knowledge) -> Self {
+    pub fn new(x: &SignalMatrix, targets: &[[f64; 3]], known: &SignalKnowledge) -> Self {
         let (templates, unit) = templates(x, targets, known);
         Self {
             templates,
@@ -49,7 +49,7 @@ impl MeasuredMatching {
     #[must_use]
     pub fn find(&self, reading: &[f64], used: &[bool]) -> DVec3 {
         let scaled: Vec<f64> = reading.iter().map(|r| r * self.scale).collect();
-        let fits: Vec<Fit> = (self.templates.iter())
+        let fits: Vec<TemplateFit> = (self.templates.iter())
             .map(|template| {
                 let sites = || {
                     let all = template.sites.iter().zip(&scaled).zip(used);
@@ -74,7 +74,7 @@ impl MeasuredMatching {
 
     /// The posterior around a template: of the place along both directions in units of its reach, and of the force
     /// in units of the largest.
-    fn fit<'a, I>(&self, template: &Template, sites: &dyn Fn() -> I) -> Fit
+    fn fit<'a, I>(&self, template: &Template, sites: &dyn Fn() -> I) -> TemplateFit
     where
         I: Iterator<Item = (&'a SiteSignal, &'a f64)>,
     {
@@ -97,7 +97,7 @@ impl MeasuredMatching {
             logs += variance.ln();
         }
         let Some(factor) = information.cholesky() else {
-            return Fit {
+            return TemplateFit {
                 log: f64::NEG_INFINITY,
                 position: template.position,
             };
@@ -106,7 +106,7 @@ impl MeasuredMatching {
         // Nothing pulls.
         let pulls = mean[2].min(0.0).powi(2) * information[(2, 2)];
         let [along, across] = [0, 1].map(|k| template.plane[k] * (mean[k] * template.reach));
-        Fit {
+        TemplateFit {
             log: -0.5 * (squares - pull.dot(&mean) + logs + factor.ln_determinant() + pulls),
             position: template.position + along + across,
         }
@@ -134,7 +134,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::placement::expected_error::Forces;
+    use crate::placement::expected_error::SceneForces;
 
     /// A row of places 2 mm apart, three sites that feel what is near them, and forces.
     fn row(force: impl Fn(usize) -> f64) -> (SignalMatrix, Vec<[f64; 3]>) {
@@ -153,8 +153,8 @@ mod tests {
         (-((p[0] - site).powi(2) + (p[1] - 0.1 * site).powi(2)) / 60.0).exp()
     }
 
-    fn known(forces: Option<Forces<'_>>) -> Knowledge<'_> {
-        Knowledge {
+    fn known(forces: Option<SceneForces<'_>>) -> SignalKnowledge<'_> {
+        SignalKnowledge {
             noise: 1e-3,
             variance: None,
             shared: None,
@@ -180,7 +180,7 @@ mod tests {
     fn the_force_is_found_with_the_place() {
         let forces: Vec<f64> = (0..30).map(|t| 1.0 + 0.1 * f64::from(t % 7)).collect();
         let (x, targets) = row(|t| forces[t]);
-        let of = Forces {
+        let of = SceneForces {
             touches: &forces,
             coming: [0.5, 5.0],
             possible: 20.0,

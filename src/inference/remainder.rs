@@ -56,11 +56,11 @@ pub struct RemainderSettings {
 pub struct Remainder {
     /// Of the process.
     pub settings: RemainderSettings,
-    places: Vec<Place>,
+    places: Vec<RemainderPlace>,
 }
 
 /// What is known at one place, in units of s: of each channel.
-struct Place {
+struct RemainderPlace {
     position: DVec3,
     /// y - g, and the variance that noise leaves of it; infinite of a channel that was not read.
     off: Vec<f64>,
@@ -84,7 +84,7 @@ impl Remainder {
             return Ok(None);
         }
         let (lower, upper) = map.mesh.bounds();
-        let search = Search::new(&places, (upper - lower).length());
+        let search = RemainderSearch::new(&places, (upper - lower).length());
         let settings = search.best(watch)?;
         Ok(Some(Self { settings, places }))
     }
@@ -137,7 +137,7 @@ impl Remainder {
         let near = nearest(&self.places, all, at, AROUND);
         let RemainderSettings { share, length, .. } = self.settings;
         let prior = share * share;
-        let block = Block::new(&self.places, &near, at, length);
+        let block = CorrelationBlock::new(&self.places, &near, at, length);
         (0..channels)
             .map(|c| {
                 let said = block.foresee(&self.places, &near, c, &self.settings);
@@ -172,7 +172,7 @@ impl Scales {
 }
 
 /// What presses say of the map at each place, those at one and the same place together: the force of each is its weight.
-fn places(map: &ResponseMap, known: &[KnownPress], noise: &[f64]) -> Vec<Place> {
+fn places(map: &ResponseMap, known: &[KnownPress], noise: &[f64]) -> Vec<RemainderPlace> {
     let scales = Scales::of(map);
     let channels = map.channels();
     let mut order: Vec<usize> = Vec::new();
@@ -201,7 +201,7 @@ fn places(map: &ResponseMap, known: &[KnownPress], noise: &[f64]) -> Vec<Place> 
         let or = |c: usize, value: &dyn Fn(usize) -> f64, without: f64| {
             if read(c) { value(c) } else { without }
         };
-        Place {
+        RemainderPlace {
             position: map.mesh.point(known[k].at),
             off: (0..channels).map(|c| or(c, &off, 0.0)).collect(),
             noise: (0..channels).map(|c| or(c, &left, f64::INFINITY)).collect(),
@@ -212,7 +212,7 @@ fn places(map: &ResponseMap, known: &[KnownPress], noise: &[f64]) -> Vec<Place> 
 
 /// The nearest of some places, nearest first; of two as near the first.
 fn nearest(
-    places: &[Place],
+    places: &[RemainderPlace],
     among: impl Iterator<Item = usize>,
     to: DVec3,
     most: usize,
@@ -237,13 +237,13 @@ pub fn matern(distance: f64) -> f64 {
 }
 
 /// Correlations among some places, and with one more.
-struct Block {
+struct CorrelationBlock {
     among: DMatrix<f64>,
     with: DVector<f64>,
 }
 
-impl Block {
-    fn new(places: &[Place], near: &[usize], at: DVec3, length: f64) -> Self {
+impl CorrelationBlock {
+    fn new(places: &[RemainderPlace], near: &[usize], at: DVec3, length: f64) -> Self {
         let position = |k: usize| places[near[k]].position;
         let count = near.len();
         let mut among = DMatrix::identity(count, count);
@@ -260,7 +260,7 @@ impl Block {
     /// Mean and variance of a channel's z there. Nothing where numbers overflow.
     fn foresee(
         &self,
-        places: &[Place],
+        places: &[RemainderPlace],
         near: &[usize],
         channel: usize,
         settings: &RemainderSettings,
@@ -289,8 +289,8 @@ impl Block {
 }
 
 /// The search for settings.
-struct Search<'a> {
-    places: &'a [Place],
+struct RemainderSearch<'a> {
+    places: &'a [RemainderPlace],
     /// The places that are foreseen, each from these before it.
     before: Vec<(usize, Vec<usize>)>,
     /// Of the part (m).
@@ -301,8 +301,8 @@ struct Search<'a> {
 /// less it may well be (natural logarithm).
 const USUAL: [(f64, f64); 3] = [(0.05, 1.5), (0.15, 1.0), (0.02, 1.5)];
 
-impl<'a> Search<'a> {
-    fn new(places: &'a [Place], size: f64) -> Self {
+impl<'a> RemainderSearch<'a> {
+    fn new(places: &'a [RemainderPlace], size: f64) -> Self {
         let searched = evenly(places.len(), SEARCHED);
         let before = (0..searched.len())
             .into_par_iter()
@@ -369,7 +369,7 @@ impl<'a> Search<'a> {
     /// Of what was read at one place, by what was read before it.
     fn likelihood(&self, k: usize, before: &[usize], settings: &RemainderSettings) -> f64 {
         let place = &self.places[k];
-        let block = Block::new(self.places, before, place.position, settings.length);
+        let block = CorrelationBlock::new(self.places, before, place.position, settings.length);
         let own = settings.scatter * settings.scatter;
         let channels = (0..place.off.len()).filter(|&c| place.noise[c].is_finite());
         channels

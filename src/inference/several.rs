@@ -17,7 +17,7 @@ use self::spot::{RADII, Spot};
 use super::matching::modes::{stand_ins, widest};
 use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
-use crate::inference::deviation::About;
+use crate::inference::deviation::TouchDoubts;
 use crate::inference::map::ResponseMap;
 use crate::inference::region::CredibleRegion;
 
@@ -44,7 +44,7 @@ const CLEAR: f64 = 0.9;
 
 /// What touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum TouchKind {
     /// As many points as there are contacts.
     Points,
     /// One area, with its radius (m).
@@ -55,9 +55,9 @@ pub enum Kind {
 
 /// All that touches, and how sure it is that there are so many.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Touches {
-    /// See [`Kind`].
-    pub kind: Kind,
+pub struct SeveralTouches {
+    /// See [`TouchKind`].
+    pub kind: TouchKind,
     /// Of there being so many, of this kind.
     pub probability: f64,
     /// The hardest first; one of an area, none of what is unclear.
@@ -68,14 +68,14 @@ pub struct Touches {
     pub shares: [f64; 5],
 }
 
-impl Touches {
+impl SeveralTouches {
     /// How likely those of another answer are, by this one: that there are as many, of the same kind.
     #[must_use]
     pub fn share_of(&self, other: &Self) -> f64 {
         let which = match other.kind {
-            Kind::Points => other.contacts.len().clamp(1, 3) - 1,
-            Kind::Area(_) => 3,
-            Kind::Unclear => 4,
+            TouchKind::Points => other.contacts.len().clamp(1, 3) - 1,
+            TouchKind::Area(_) => 3,
+            TouchKind::Unclear => 4,
         };
         self.shares[which]
     }
@@ -83,7 +83,7 @@ impl Touches {
     /// How many they are, where that is known.
     #[must_use]
     pub fn count(&self) -> Option<usize> {
-        (self.kind != Kind::Unclear).then_some(self.contacts.len())
+        (self.kind != TouchKind::Unclear).then_some(self.contacts.len())
     }
 
     /// Whether both are as many, of the same kind.
@@ -97,7 +97,7 @@ impl Touches {
     #[must_use]
     pub fn one(contact: Contact, probability: f64) -> Self {
         Self {
-            kind: Kind::Points,
+            kind: TouchKind::Points,
             probability,
             contacts: vec![contact],
             unexplained: contact.unexplained,
@@ -152,22 +152,22 @@ impl Answers {
 impl Matching {
     /// How many touches make a reading (strain, a channel each), where and how hard each is. `one` is what was found
     /// where only one is looked for.
-    pub fn count(&mut self, several: &Several, reading: &[f64], one: &Contact) -> Touches {
+    pub fn count(&mut self, several: &Several, reading: &[f64], one: &Contact) -> SeveralTouches {
         let used = self.used.clone();
         let observed = Observation::new(reading, &self.errors, &used);
         let channels = observed.w.iter().filter(|w| **w > 0.0).count();
         let alone = self.alone(&observed, one);
         let first = ONE.ln() + alone.log_evidence();
         let Some(best) = alone.best() else {
-            return Touches::one(*one, 1.0);
+            return SeveralTouches::one(*one, 1.0);
         };
         let sure = surely_one(best);
         if channels < LEAST_CHANNELS || sure >= SURE {
-            return Touches::one(*one, sure);
+            return SeveralTouches::one(*one, sure);
         }
         let coarse = &several.coarse;
         let Some(whitened) = coarse.against(&observed, self.most_force) else {
-            return Touches::one(*one, sure);
+            return SeveralTouches::one(*one, sure);
         };
         let several = self.more_than_one(&observed, coarse, &whitened);
         let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
@@ -184,15 +184,15 @@ impl Matching {
         let shares = logs.map(|log| (log - all).exp());
         let which = (0..logs.len()).fold(0, |best, k| if logs[k] > logs[best] { k } else { best });
         let answer = match which {
-            0 => Touches::one(*one, shares[0]),
-            4 => Touches {
-                kind: Kind::Unclear,
+            0 => SeveralTouches::one(*one, shares[0]),
+            4 => SeveralTouches {
+                kind: TouchKind::Unclear,
                 contacts: Vec::new(),
-                ..Touches::one(*one, shares[4])
+                ..SeveralTouches::one(*one, shares[4])
             },
             k => self.touches(&observed, &several[k - 1].1.0, shares[k]),
         };
-        Touches { shares, ..answer }
+        SeveralTouches { shares, ..answer }
     }
 
     /// Two points, three, and an area, each with the logarithm of its prior and its evidence.
@@ -251,7 +251,7 @@ impl Matching {
     /// As [`Self::count`] for touches that go on: from where they were. Nothing where they do not explain the reading any
     /// more.
     #[must_use]
-    pub fn track_several(&self, reading: &[f64], last: &Touches) -> Option<Touches> {
+    pub fn track_several(&self, reading: &[f64], last: &SeveralTouches) -> Option<SeveralTouches> {
         /// Steps from one sample to the next.
         const STEPS: usize = 2;
         let observed = Observation::new(reading, &self.errors, &self.used);
@@ -259,7 +259,7 @@ impl Matching {
         let joint = self.joined(&observed, &start, Some(STEPS))?;
         let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
         let explained = 2.0 * joint.left <= last.unexplained + differs;
-        explained.then(|| Touches {
+        explained.then(|| SeveralTouches {
             shares: last.shares,
             ..self.touches(&observed, &[joint], last.probability)
         })
@@ -267,7 +267,7 @@ impl Matching {
 
     /// What every channel reads of some touches (strain).
     #[must_use]
-    pub fn reading_of_all(&self, touches: &Touches) -> Vec<f64> {
+    pub fn reading_of_all(&self, touches: &SeveralTouches) -> Vec<f64> {
         let mut sum = vec![0.0; self.map.channels()];
         for spot in self.spots_of(touches) {
             for (s, g) in sum.iter_mut().zip(self.felt(&spot).reading) {
@@ -279,8 +279,8 @@ impl Matching {
 
     /// As [`Self::leeway`], of all of them together.
     #[must_use]
-    pub fn leeway_of_all(&self, touches: &Touches) -> Vec<Vec<f64>> {
-        if !matches!(touches.kind, Kind::Area(_)) {
+    pub fn leeway_of_all(&self, touches: &SeveralTouches) -> Vec<Vec<f64>> {
+        if !matches!(touches.kind, TouchKind::Area(_)) {
             return touches
                 .contacts
                 .iter()
@@ -303,10 +303,10 @@ impl Matching {
         ways
     }
 
-    fn spots_of(&self, touches: &Touches) -> Vec<Spot> {
+    fn spots_of(&self, touches: &SeveralTouches) -> Vec<Spot> {
         let radius = match touches.kind {
-            Kind::Area(radius) => Some(radius),
-            Kind::Points | Kind::Unclear => None,
+            TouchKind::Area(radius) => Some(radius),
+            TouchKind::Points | TouchKind::Unclear => None,
         };
         let spot = |contact: &Contact| Spot {
             at: self.map.mesh.index().nearest(contact.position).0,
@@ -380,15 +380,20 @@ impl Matching {
         sum_of(logs.iter().copied()) - (2.0 * trusted.len() as f64).ln()
     }
 
-    fn touches(&self, observed: &Observation, answers: &[Joint], probability: f64) -> Touches {
+    fn touches(
+        &self,
+        observed: &Observation,
+        answers: &[Joint],
+        probability: f64,
+    ) -> SeveralTouches {
         let best = &answers[0];
         let mut contacts: Vec<Contact> = (0..best.spots.len())
             .map(|k| self.contact_of(observed, answers, k))
             .collect();
         contacts.sort_by(|a, b| b.force.total_cmp(&a.force));
         let radius = best.spots.iter().find_map(|s| s.radius);
-        Touches {
-            kind: radius.map_or(Kind::Points, Kind::Area),
+        SeveralTouches {
+            kind: radius.map_or(TouchKind::Points, TouchKind::Area),
             probability,
             contacts,
             unexplained: 2.0 * best.left,
@@ -453,7 +458,7 @@ fn point(at: crate::mesh::SurfacePoint, force: f64) -> Spot {
         at,
         force,
         radius: None,
-        about: About::default(),
+        about: TouchDoubts::default(),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::regression::predictor::Predictor;
 use crate::regression::{Hyper, SvrParams};
 
 /// What a machine is trained on: readings (channels × touches, strain), places (mm) and forces (N).
-pub struct Lessons<'a> {
+pub struct LiveLessons<'a> {
     /// Readings, channels × touches (strain).
     pub x: &'a SignalMatrix,
     /// Where each touch was (mm).
@@ -37,7 +37,7 @@ pub enum Features {
 }
 
 /// A trained estimator of place and force.
-pub struct Trained {
+pub struct TrainedLive {
     features: Features,
     channels: Vec<usize>,
     predictor: Predictor,
@@ -47,10 +47,10 @@ pub struct Trained {
 const TOLERANCE: f64 = 0.02;
 const STEPS: usize = 2_000_000;
 
-impl Trained {
+impl TrainedLive {
     /// Trains with the settings that a search found for places; the force's tube is as wide in its own unit.
     #[must_use]
-    pub fn train(features: Features, lessons: &Lessons, hyper: &Hyper) -> Self {
+    pub fn train(features: Features, lessons: &LiveLessons, hyper: &Hyper) -> Self {
         let channels: Vec<usize> = (0..lessons.used.len())
             .filter(|&c| lessons.used[c])
             .collect();
@@ -135,7 +135,7 @@ fn norm(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The used channels by rows, each sample with noise and gains of its own.
-fn disturbed(lessons: &Lessons, channels: &[usize]) -> Vec<Vec<f64>> {
+fn disturbed(lessons: &LiveLessons, channels: &[usize]) -> Vec<Vec<f64>> {
     let row = |&c: &usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(lessons.seed);
         rng.set_stream(c as u64);

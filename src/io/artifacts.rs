@@ -13,7 +13,7 @@ use super::{FileError, atomic, handover, project_file, report, source};
 use crate::dataset::Dataset;
 use crate::design::{Design, Inputs};
 use crate::evaluation::{EstimatorKind, EvaluationRow};
-use crate::paper::Format;
+use crate::paper::SheetSize;
 use crate::placement::expected_error::ASSUMES;
 use crate::placement::information::Geometry;
 use crate::project::Project;
@@ -36,7 +36,13 @@ pub fn write_all(
 ) -> Result<Vec<PathBuf>, FileError> {
     std::fs::create_dir_all(folder).map_err(|e| FileError::of(folder, &e))?;
     let place = Together::claim(folder)?;
-    write_into(&place, inputs, design, provenance, Some(Format::default()))
+    write_into(
+        &place,
+        inputs,
+        design,
+        provenance,
+        Some(SheetSize::default()),
+    )
 }
 
 /// As [`write_all`], into a folder that is claimed already; what the workshop is given only where there is a format for it.
@@ -48,7 +54,7 @@ pub fn write_into(
     inputs: &Inputs,
     design: &Design,
     provenance: &Provenance,
-    handed_over: Option<Format>,
+    handed_over: Option<SheetSize>,
 ) -> Result<Vec<PathBuf>, FileError> {
     let mut handed = Vec::new();
     place.replace(|new| {

@@ -16,7 +16,7 @@ use super::fingerprint::Fingerprint;
 use super::npz::{self, NpzFile};
 use super::table::Writing;
 use super::{FileError, atomic, points, source};
-use crate::bench::Answer;
+use crate::bench::CheckedForce;
 use crate::design::Inputs;
 
 const FORMAT: u32 = 1;
@@ -50,7 +50,7 @@ pub fn key_in(data: &Path, name: &str) -> Result<Option<String>, FileError> {
 /// What is pressed, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct About {
+pub struct PressedPart {
     /// Of these files.
     pub format: u32,
     /// Key of the part and its gauges.
@@ -88,7 +88,7 @@ pub fn limb_key(inputs: &Inputs) -> String {
     key.hex()
 }
 
-impl About {
+impl PressedPart {
     /// The newest format, of everything else as given by the caller.
     #[must_use]
     pub fn format() -> u32 {
@@ -134,7 +134,7 @@ impl About {
 ///
 /// # Errors
 /// [`FileError`] where it cannot be read.
-pub fn read_answer(folder: &Path) -> Result<Option<Answer>, FileError> {
+pub fn read_answer(folder: &Path) -> Result<Option<CheckedForce>, FileError> {
     let path = folder.join(ANSWER);
     if !path.exists() {
         return Ok(None);
@@ -150,7 +150,7 @@ pub fn read_answer(folder: &Path) -> Result<Option<Answer>, FileError> {
 ///
 /// # Errors
 /// [`FileError`] where it cannot be written.
-pub fn write_answer(folder: &Path, answer: &Answer) -> Result<(), FileError> {
+pub fn write_answer(folder: &Path, answer: &CheckedForce) -> Result<(), FileError> {
     let path = folder.join(ANSWER);
     let text = serde_json::to_string_pretty(answer)
         .map_err(|e| FileError::broken(&path, e.to_string()))?;
@@ -212,7 +212,7 @@ fn number(path: &Path) -> Option<u32> {
 
 /// Readings as a dataset: a column a touch.
 #[derive(Clone, Debug, Default)]
-pub struct Columns {
+pub struct TouchColumns {
     /// Strain of each gauge, a row a touch.
     pub strains: Vec<Vec<f64>>,
     /// m.
@@ -227,7 +227,7 @@ pub struct Columns {
     pub seconds: Vec<f64>,
 }
 
-impl Columns {
+impl TouchColumns {
     /// Writes them as NPZ, with the keys of limb and board.
     ///
     /// # Errors

@@ -10,11 +10,11 @@ use std::path::Path;
 use glam::DVec3;
 
 use self::found::ABSURD;
-use self::found::{Found, PLACE, Touches};
-use self::plausible::Origin;
+use self::found::{FoundDataset, FoundTouches, PLACE};
+use self::plausible::FileOrigin;
 use super::FileError;
 use super::npz::{self, Arrays};
-use super::table::Table;
+use super::table::NamedTable;
 use crate::plain::quote;
 
 pub use self::found::GivenData;
@@ -41,9 +41,9 @@ pub fn read_to_answer(path: &Path, touches: Option<&Path>) -> Result<GivenData, 
     found(path, touches)?.checked(path)
 }
 
-fn found(path: &Path, touches: Option<&Path>) -> Result<Found, FileError> {
+fn found(path: &Path, touches: Option<&Path>) -> Result<FoundDataset, FileError> {
     if path.is_dir() {
-        exports::read(path, Touches::read(needed(path, touches)?)?)
+        exports::read(path, FoundTouches::read(needed(path, touches)?)?)
     } else if ends_with(path, "npz") {
         if let Some(touches) = touches {
             return Err(FileError::broken(
@@ -53,7 +53,7 @@ fn found(path: &Path, touches: Option<&Path>) -> Result<Found, FileError> {
         }
         read_npz(path)
     } else if ends_with(path, "csv") {
-        read_csv(path, Touches::read(needed(path, touches)?)?)
+        read_csv(path, FoundTouches::read(needed(path, touches)?)?)
     } else {
         Err(FileError::broken(
             path,
@@ -75,7 +75,7 @@ fn metres(mm: &[[f64; 3]]) -> Vec<DVec3> {
     mm.iter().map(|&p| DVec3::from_array(p) * 1e-3).collect()
 }
 
-fn read_npz(path: &Path) -> Result<Found, FileError> {
+fn read_npz(path: &Path) -> Result<FoundDataset, FileError> {
     let broken = |message: String| Err(FileError::broken(path, message));
     let mut arrays = Arrays::open(path)?;
     let x = arrays.numbers("X")?;
@@ -117,14 +117,14 @@ fn read_npz(path: &Path) -> Result<Found, FileError> {
             forces.len()
         ));
     }
-    Ok(Found {
+    Ok(FoundDataset {
         values: x.values,
         targets: pressed.iter().map(|&p| (p * 1e3).to_array()).collect(),
         positions: known,
         costs,
         forces,
-        touches: Origin::array(path, "touches", "p_m"),
-        sites: Origin::array(path, "sites", "site_m"),
+        touches: FileOrigin::array(path, "touches", "p_m"),
+        sites: FileOrigin::array(path, "sites", "site_m"),
         notes: Vec::new(),
     })
 }
@@ -211,7 +211,7 @@ pub fn groups(path: &Path, name: &str, touches: usize) -> Result<Option<Vec<usiz
 }
 
 fn group_column(path: &Path) -> Result<Vec<f64>, FileError> {
-    let table = Table::read(path)?;
+    let table = NamedTable::read(path)?;
     let [group] = table.columns(&["group"])?;
     table.rows().map(|row| row?.number(group)).collect()
 }
@@ -222,9 +222,9 @@ fn ends_with(path: &Path, ending: &str) -> bool {
 }
 
 /// A row a site: `x_mm,y_mm,z_mm`, `dx,dy,dz` and `cost` where there are some, and then a column a touch.
-fn read_csv(path: &Path, touches: Touches) -> Result<Found, FileError> {
+fn read_csv(path: &Path, touches: FoundTouches) -> Result<FoundDataset, FileError> {
     const KNOWN: [&str; 7] = ["x_mm", "y_mm", "z_mm", "dx", "dy", "dz", "cost"];
-    let table = Table::read(path)?;
+    let table = NamedTable::read(path)?;
     let place = table.columns(&PLACE)?;
     let cost = table.column("cost")?;
     let signals: Vec<usize> = (0..)
@@ -258,14 +258,14 @@ fn read_csv(path: &Path, touches: Touches) -> Result<Found, FileError> {
     if mm.is_empty() {
         return Err(table.wrong("there is no row below the first line: one is needed a site"));
     }
-    Ok(Found {
+    Ok(FoundDataset {
         values,
         targets: touches.mm,
         positions: metres(&mm),
         costs,
         forces: touches.forces,
         touches: touches.origin,
-        sites: Origin::lines(path, "sites", lines),
+        sites: FileOrigin::lines(path, "sites", lines),
         notes: Vec::new(),
     })
 }

@@ -27,7 +27,7 @@ pub fn write_glb(mesh: &TriMesh) -> Result<Vec<u8>, gltf::Error> {
 
 /// A piece of a scene.
 #[derive(Clone, Debug)]
-pub struct Piece {
+pub struct ScenePiece {
     pub name: String,
     /// m.
     pub positions: Vec<DVec3>,
@@ -41,7 +41,11 @@ pub struct Piece {
 ///
 /// # Errors
 /// Only what serialization itself reports.
-pub fn write_scene(pieces: &[Piece], stance: Stance, by: String) -> Result<Vec<u8>, gltf::Error> {
+pub fn write_scene(
+    pieces: &[ScenePiece],
+    stance: Stance,
+    by: String,
+) -> Result<Vec<u8>, gltf::Error> {
     let mut builder = Builder::new();
     builder.root.asset.generator = Some(by);
     let material = builder.matt();

@@ -24,17 +24,17 @@ mod stamp;
 mod tables;
 mod templates;
 
-use self::source::Source;
+use self::source::HandoverSource;
 use super::bench_folder::limb_key;
 use super::mesh_file::urdf::link_of;
 use super::run::{Provenance, as_computed, run_key};
 use crate::budget::unwatched;
 use crate::design::{Design, Inputs};
-use crate::paper::{self, Format};
+use crate::paper::{self, SheetSize};
 use crate::plain::robust_top;
 use crate::workshop::{self, Inner, Wiring};
 
-pub use self::scene::Scene;
+pub use self::scene::StepScene;
 
 /// The names of all files.
 pub const FILES: [&str; 8] = [
@@ -56,11 +56,11 @@ pub fn files(
     inputs: &Inputs,
     design: &Design,
     provenance: &Provenance,
-    format: Format,
+    format: SheetSize,
 ) -> Result<Vec<(String, Vec<u8>)>, String> {
     let inner = Inner::of(inputs, design);
     let landmarks = workshop::landmarks(&inner);
-    let source = Source {
+    let source = HandoverSource {
         jig: workshop::jig_of(inputs, &inner, &unwatched).map_err(|e| e.to_string())?,
         wiring: wiring(inputs, &inner, &landmarks),
         name: name(provenance),
@@ -98,7 +98,7 @@ pub fn files(
 }
 
 /// The limb coloured by the mean error of touches around each place, where that was judged.
-fn scene(source: &Source<'_>) -> Result<Vec<u8>, String> {
+fn scene(source: &HandoverSource<'_>) -> Result<Vec<u8>, String> {
     let mesh = &source.design.simulated.mesh;
     let errors = source.design.error_map(mesh);
     let field = errors.map(|errors| {
@@ -109,7 +109,7 @@ fn scene(source: &Source<'_>) -> Result<Vec<u8>, String> {
             .collect::<Vec<f64>>()
     });
     let keys = &source.inputs.project.gauge;
-    Scene {
+    StepScene {
         limb: mesh,
         field: field.as_deref(),
         inner: &source.inner,

@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{FileError, source};
-use crate::bench::{Axis, Machine, Mount, TipSensor, Touched};
+use crate::bench::{Machine, MachineAxis, TableMount, TipSensor, TouchedPoint};
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
 
@@ -22,7 +22,7 @@ struct File {
     format: u32,
     name: String,
     axes: Axes,
-    tip: Tip,
+    tip: TipTable,
     #[serde(default)]
     commands: Commands,
     #[serde(default)]
@@ -52,7 +52,7 @@ struct AxisEntry {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Tip {
+struct TipTable {
     radius_mm: f64,
     clearance_mm: f64,
     most_tilt_deg: f64,
@@ -142,7 +142,7 @@ pub fn parse(text: &str) -> Result<MachineFile, String> {
     })
 }
 
-fn axis(name: &str, entry: &AxisEntry) -> Result<Axis, String> {
+fn axis(name: &str, entry: &AxisEntry) -> Result<MachineAxis, String> {
     let wrong = |what: &str| Err(format!("axes.{name}: {what}"));
     let finite = [entry.zero, entry.range[0], entry.range[1], entry.speed];
     if !finite.iter().all(|v| v.abs() < 1e6) {
@@ -160,7 +160,7 @@ fn axis(name: &str, entry: &AxisEntry) -> Result<Axis, String> {
     if entry.speed <= 0.0 {
         return wrong("its speed must be above zero");
     }
-    Ok(Axis {
+    Ok(MachineAxis {
         letter: entry.letter,
         zero: entry.zero,
         sign: entry.sign,
@@ -208,19 +208,19 @@ impl MachineFile {
     ///
     /// # Errors
     /// A message where the points say too little, or do not fit this limb.
-    pub fn mount(&self, limb: &TriMesh, stance: &Stance) -> Result<(Mount, Vec<f64>), String> {
+    pub fn mount(&self, limb: &TriMesh, stance: &Stance) -> Result<(TableMount, Vec<f64>), String> {
         if self.touched.is_empty() {
             let (low, high) = limb.bounds();
             let middle = (low + high) / 2.0;
             return Ok((
-                Mount::upright(stance.up(), stance.front(), middle),
+                TableMount::upright(stance.up(), stance.front(), middle),
                 Vec::new(),
             ));
         }
-        let touched: Vec<Touched> = (self.touched.iter())
+        let touched: Vec<TouchedPoint> = (self.touched.iter())
             .map(|entry| self.touched(entry, limb))
             .collect::<Result<_, _>>()?;
-        let (mount, off) = Mount::fit(&touched, self.machine.tip_radius)?;
+        let (mount, off) = TableMount::fit(&touched, self.machine.tip_radius)?;
         let worst = off.iter().copied().fold(0.0, f64::max);
         if worst > self.fit {
             let each: Vec<String> = off.iter().map(|o| format!("{:.2}", o * 1e3)).collect();
@@ -233,7 +233,7 @@ impl MachineFile {
         Ok((mount, off))
     }
 
-    fn touched(&self, entry: &TouchedEntry, limb: &TriMesh) -> Result<Touched, String> {
+    fn touched(&self, entry: &TouchedEntry, limb: &TriMesh) -> Result<TouchedPoint, String> {
         /// How far from the limb its points may be given (m).
         const FAR: f64 = 3e-3;
         let asked = DVec3::from_array(entry.limb_mm) * 1e-3;
@@ -258,7 +258,7 @@ impl MachineFile {
             }
         }
         let pose = machine.pose_of(|axis| entry.at.get(&axis.letter).copied().unwrap_or(axis.zero));
-        Ok(Touched {
+        Ok(TouchedPoint {
             limb: limb.point(at),
             normal: limb.normal(at),
             tip: pose.on_table(),

@@ -39,7 +39,7 @@ use crate::mesh::{MeshError, RepairReport, TriMesh};
 use crate::plain;
 use crate::project::{Masks, Unit};
 
-pub use self::found::Found;
+pub use self::found::FoundDeck;
 
 /// A mesh from a file with what was changed on the way in.
 pub struct LoadedMesh {
@@ -48,7 +48,7 @@ pub struct LoadedMesh {
     /// Vertices of each named group of the file that lie on the body.
     pub groups: Masks,
     /// What the file says beside its mesh.
-    pub found: Found,
+    pub found: FoundDeck,
 }
 
 /// Whether a mesh of this name does not say its unit.
@@ -235,7 +235,7 @@ fn surface(soup: &mut Soup, body: usize, repair: &Repair) -> Result<LoadedMesh, 
         groups: groups.into_iter().map(spread).collect(),
         mesh,
         repairs,
-        found: Found::default(),
+        found: FoundDeck::default(),
     })
 }
 
@@ -292,7 +292,7 @@ fn tetrahedral(
             ..RepairReport::default()
         },
         mesh: mesh.around(piece),
-        found: Found::default(),
+        found: FoundDeck::default(),
     })
 }
 

@@ -50,11 +50,11 @@ pub enum NpyError {
 /// # Errors
 /// [`NpyError`] for what is damaged, is no array of numbers, or is larger than memory bears.
 pub fn read(mut from: impl Read) -> Result<Array, NpyError> {
-    let Header {
+    let NpyHeader {
         number,
         fortran,
         shape,
-    } = Header::read(&mut from)?;
+    } = NpyHeader::read(&mut from)?;
     let values = values(from, number, count(&shape)?)?;
     let values = match shape[..] {
         [rows, columns] if fortran => (0..rows)
@@ -105,13 +105,13 @@ fn values(mut from: impl Read, number: Number, count: usize) -> Result<Vec<f64>,
     }
 }
 
-struct Header {
+struct NpyHeader {
     number: Number,
     fortran: bool,
     shape: Vec<usize>,
 }
 
-impl Header {
+impl NpyHeader {
     fn read(from: &mut impl Read) -> Result<Self, NpyError> {
         let mut start = [0; 8];
         from.read_exact(&mut start).map_err(|_| NpyError::NoArray)?;
@@ -172,14 +172,14 @@ fn entry<'a>(text: &'a str, key: &str) -> Option<&'a str> {
 /// How one number is written.
 #[derive(Clone, Copy)]
 struct Number {
-    kind: Kind,
+    kind: NumberKind,
     /// Bytes: 1, 2, 4 or 8.
     size: usize,
     big_endian: bool,
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum NumberKind {
     Bool,
     Signed,
     Unsigned,
@@ -194,10 +194,10 @@ impl Number {
         let mut letters = plain.chars();
         let letter = letters.next().unwrap_or(' ');
         let (kind, size) = match (letter, letters.as_str().parse()) {
-            ('b', Ok(1)) => (Kind::Bool, 1),
-            ('i', Ok(size @ (1 | 2 | 4 | 8))) => (Kind::Signed, size),
-            ('u', Ok(size @ (1 | 2 | 4 | 8))) => (Kind::Unsigned, size),
-            ('f', Ok(size @ (2 | 4 | 8))) => (Kind::Float, size),
+            ('b', Ok(1)) => (NumberKind::Bool, 1),
+            ('i', Ok(size @ (1 | 2 | 4 | 8))) => (NumberKind::Signed, size),
+            ('u', Ok(size @ (1 | 2 | 4 | 8))) => (NumberKind::Unsigned, size),
+            ('f', Ok(size @ (2 | 4 | 8))) => (NumberKind::Float, size),
             ('f', _) => return refused("numbers of extended precision (longdouble)"),
             ('c', _) => return refused("complex numbers"),
             ('U' | 'S' | 'a', _) => return refused("text"),
@@ -223,12 +223,12 @@ impl Number {
         };
         let unused = 64 - 8 * self.size;
         match (self.kind, self.size) {
-            (Kind::Bool, _) => f64::from(u8::from(bits != 0)),
-            (Kind::Signed, _) => ((bits << unused) as i64 >> unused) as f64,
-            (Kind::Unsigned, _) => bits as f64,
-            (Kind::Float, 2) => half(bits as u16),
-            (Kind::Float, 4) => f64::from(f32::from_bits(bits as u32)),
-            (Kind::Float, _) => f64::from_bits(bits),
+            (NumberKind::Bool, _) => f64::from(u8::from(bits != 0)),
+            (NumberKind::Signed, _) => ((bits << unused) as i64 >> unused) as f64,
+            (NumberKind::Unsigned, _) => bits as f64,
+            (NumberKind::Float, 2) => half(bits as u16),
+            (NumberKind::Float, 4) => f64::from(f32::from_bits(bits as u32)),
+            (NumberKind::Float, _) => f64::from_bits(bits),
         }
     }
 }

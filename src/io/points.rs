@@ -6,11 +6,11 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::npz::NpzFile;
-use super::table::{Row, Table, Writing};
+use super::table::{NamedTable, TableRow, Writing};
 use super::{FileError, atomic};
 use crate::board::{GivenPress, PRESSES, RAMP_S};
 use crate::elasticity::Touch;
-use crate::given::{self, Answer, GivenSite};
+use crate::given::{self, GivenAnswer, GivenSite};
 use crate::project::TouchKeys;
 
 const TOUCHES: [&str; 8] = [
@@ -94,7 +94,7 @@ const BESIDE: [(&str, RangeInclusive<f64>); 4] = [
 /// # Errors
 /// [`FileError`] naming the file, the line and the column.
 pub fn read_presses(path: &Path) -> Result<Vec<GivenPress>, FileError> {
-    let table = Table::read(path)?;
+    let table = NamedTable::read(path)?;
     let mut beside = [None; 4];
     for (column, (name, _)) in beside.iter_mut().zip(&BESIDE) {
         *column = table.column(name)?;
@@ -115,7 +115,7 @@ pub fn read_presses(path: &Path) -> Result<Vec<GivenPress>, FileError> {
 }
 
 /// What a row says in the columns that need not be there.
-fn besides(row: &Row, columns: &[Option<usize>; 4]) -> Result<[Option<f64>; 4], FileError> {
+fn besides(row: &TableRow, columns: &[Option<usize>; 4]) -> Result<[Option<f64>; 4], FileError> {
     let mut found = [None; 4];
     for ((value, column), (name, range)) in found.iter_mut().zip(columns).zip(&BESIDE) {
         let given = column.filter(|&column| !row.text(column).is_empty());
@@ -162,13 +162,13 @@ impl AskedPoint {
 /// # Errors
 /// [`FileError`] naming the file, the line and the column.
 pub fn read_points(path: &Path) -> Result<Vec<AskedPoint>, FileError> {
-    let table = Table::read(path)?;
+    let table = NamedTable::read(path)?;
     let more = [
         table.column("force_n")?,
         table.column("start_s")?,
         table.column("duration_s")?,
     ];
-    let take = |row: &Row, [x, y, z]: [f64; 3]| {
+    let take = |row: &TableRow, [x, y, z]: [f64; 3]| {
         let number = |column: Option<usize>| column.map(|c| row.number(c)).transpose();
         let [force, start, duration] = [number(more[0])?, number(more[1])?, number(more[2])?];
         let force = force.map(|f| ranged(row, "force_n", f, &PRESSES, "above zero"));
@@ -206,7 +206,7 @@ pub fn place(path: &Path, number: usize) -> String {
 /// The lines of all rows of such a table; none of what cannot be read.
 #[must_use]
 pub fn lines(path: &Path) -> Vec<u64> {
-    let Ok(table) = Table::read(path) else {
+    let Ok(table) = NamedTable::read(path) else {
         return Vec::new();
     };
     (table.rows())
@@ -222,7 +222,7 @@ fn direction(v: DVec3) -> Option<DVec3> {
 }
 
 fn ranged(
-    row: &Row,
+    row: &TableRow,
     name: &str,
     value: f64,
     range: &RangeInclusive<f64>,
@@ -242,9 +242,9 @@ fn ranged(
 fn read<const N: usize, T>(
     path: &Path,
     names: &[&str; N],
-    take: impl Fn(&Row, [f64; N]) -> Result<T, FileError>,
+    take: impl Fn(&TableRow, [f64; N]) -> Result<T, FileError>,
 ) -> Result<Vec<T>, FileError> {
-    let table = Table::read(path)?;
+    let table = NamedTable::read(path)?;
     let rows = taken(&table, names, take)?;
     if rows.is_empty() {
         return Err(table.wrong("there is no row below the first line"));
@@ -254,9 +254,9 @@ fn read<const N: usize, T>(
 
 /// As [`read`], of a table that may have no rows.
 fn taken<const N: usize, T>(
-    table: &Table,
+    table: &NamedTable,
     names: &[&str; N],
-    take: impl Fn(&Row, [f64; N]) -> Result<T, FileError>,
+    take: impl Fn(&TableRow, [f64; N]) -> Result<T, FileError>,
 ) -> Result<Vec<T>, FileError> {
     let columns = table.columns(names)?;
     table
@@ -273,14 +273,14 @@ fn taken<const N: usize, T>(
 ///
 /// # Errors
 /// [`FileError`] naming the file.
-pub fn write_answers(path: &Path, answer: &Answer) -> Result<(), FileError> {
+pub fn write_answers(path: &Path, answer: &GivenAnswer) -> Result<(), FileError> {
     if path.extension().is_some_and(|e| e == "npz") {
         return write_npz(path, answer).map_err(|e| FileError::of(path, &e))?;
     }
     atomic::write(path, csv(answer).as_bytes())
 }
 
-fn csv(answer: &Answer) -> String {
+fn csv(answer: &GivenAnswer) -> String {
     let rows = &answer.rows;
     let mut table = Writing::new([
         "touch",
@@ -313,7 +313,7 @@ fn csv(answer: &Answer) -> String {
     table.text() + &left_out.collect::<String>()
 }
 
-fn write_npz(path: &Path, answer: &Answer) -> std::io::Result<Result<(), FileError>> {
+fn write_npz(path: &Path, answer: &GivenAnswer) -> std::io::Result<Result<(), FileError>> {
     let rows = &answer.rows;
     let shape = [rows.touch_distances.len(), rows.site_distances.len()];
     let mut columns: [Vec<f64>; 4] = std::array::from_fn(|_| vec![f64::NAN; shape[0] * shape[1]]);
@@ -333,16 +333,16 @@ fn write_npz(path: &Path, answer: &Answer) -> std::io::Result<Result<(), FileErr
     file.add("touch_distance_mm", touches, &mm(&rows.touch_distances))?;
     file.add("site_distance_mm", sites, &mm(&rows.site_distances))?;
     file.add("site_angle_deg", sites, &rows.site_angles)?;
-    let missing = |table: given::Table, count: usize| {
+    let missing = |table: given::GivenTable, count: usize| {
         let mut missing = vec![0_u8; count];
         for left_out in rows.left_out.iter().filter(|l| l.table == table) {
             missing[left_out.row] = 1;
         }
         missing
     };
-    let left_out = missing(given::Table::Touches, shape[0]);
+    let left_out = missing(given::GivenTable::Touches, shape[0]);
     file.add("touch_left_out", touches, &left_out)?;
-    let left_out = missing(given::Table::Sites, shape[1]);
+    let left_out = missing(given::GivenTable::Sites, shape[1]);
     file.add("site_left_out", sites, &left_out)?;
     Ok(file.save(path))
 }

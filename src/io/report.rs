@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 
 use self::settings::settings;
 use super::run::{Provenance, range, signal_to_noise, signal_unit};
-use super::svg::{self, Marker, Paint, Series, escape};
+use super::svg::{self, Marker, Paint, PlotSeries, escape};
 use crate::colormap::ColorMap;
 use crate::design::InnerFace;
 use crate::design::curves::{curve, failure_curve, failure_ways};
@@ -276,10 +276,10 @@ fn plots(page: &mut String, design: &Design) {
             continue;
         }
         seen.push(region);
-        let series: Vec<Series> = design
+        let series: Vec<PlotSeries> = design
             .selections
             .iter()
-            .map(|s| Series {
+            .map(|s| PlotSeries {
                 name: s.selector.title(),
                 points: curve(design, s.selector, region),
             })
@@ -306,7 +306,7 @@ fn reduction(page: &mut String, candidates: &Candidates) {
         "Variance of all feasible sites left unexplained",
         "sites kept",
         "%",
-        &[Series {
+        &[PlotSeries {
             name: "held-out touches",
             points: points.collect(),
         }],
@@ -401,11 +401,11 @@ fn kernel_search(page: &mut String, design: &Design) {
 fn failures(page: &mut String, design: &Design) {
     page.push_str("<h2>When gauges fail</h2><div class=\"plots\">");
     for &(retrained, title) in failure_ways(design.evaluation.judging.estimator()) {
-        let series: Vec<Series> = design
+        let series: Vec<PlotSeries> = design
             .evaluation
             .failures
             .iter()
-            .map(|set| Series {
+            .map(|set| PlotSeries {
                 name: set.set.chooser.title(),
                 points: failure_curve(set, retrained),
             })
@@ -432,10 +432,10 @@ fn failures(page: &mut String, design: &Design) {
     page.push_str("</table></details>");
 }
 
-fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
+fn baseline<'a>(design: &Design, region: &str) -> Option<PlotSeries<'a>> {
     let row = design.evaluation.baseline(region)?;
     let most = design.selections.iter().map(|s| s.sets.len()).max()? as f64;
-    Some(Series {
+    Some(PlotSeries {
         name: row.set.chooser.title(),
         points: vec![(1.0, row.error_mm), (most, row.error_mm)],
     })

@@ -21,13 +21,13 @@ const RIGHT: f64 = 16.0;
 const BOTTOM: f64 = 46.0;
 
 /// An axis from one number to another, and where its numbers stand.
-struct Axis {
+struct LinearAxis {
     from: f64,
     to: f64,
     ticks: Vec<f64>,
 }
 
-impl Axis {
+impl LinearAxis {
     fn over(values: impl Iterator<Item = f64> + Clone) -> Self {
         let low = values.clone().fold(f64::INFINITY, f64::min);
         let high = values.fold(f64::NEG_INFINITY, f64::max);
@@ -56,7 +56,7 @@ impl Axis {
 #[must_use]
 pub fn scatter(title: &str, [x_label, y_label]: [&str; 2], dots: &[Dot], width: f64) -> String {
     let height = 0.6 * width;
-    let [x, y] = [0, 1].map(|k| Axis::over(dots.iter().map(move |d| d.at[k])));
+    let [x, y] = [0, 1].map(|k| LinearAxis::over(dots.iter().map(move |d| d.at[k])));
     let px = |v: f64| LEFT + x.share(v) * (width - LEFT - RIGHT);
     let py = |v: f64| TOP + (1.0 - y.share(v)) * (height - TOP - BOTTOM);
     let mut svg = format!(
@@ -150,14 +150,14 @@ mod tests {
 
     #[test]
     fn axes_hold_all_points_and_have_round_numbers() {
-        let axis = Axis::over([0.93, 2.31, 1.4].into_iter());
+        let axis = LinearAxis::over([0.93, 2.31, 1.4].into_iter());
         assert!(axis.from <= 0.93 && axis.to >= 2.31);
         assert_eq!(
             axis.ticks.iter().map(|t| tidy(*t)).collect::<Vec<_>>(),
             ["0.5", "1", "1.5", "2", "2.5"]
         );
-        let one = Axis::over([3.0].into_iter());
+        let one = LinearAxis::over([3.0].into_iter());
         assert!(one.from <= 3.0 && one.to >= 3.0 && one.share(3.0).is_finite());
-        assert!(Axis::over(std::iter::empty()).share(0.5).is_finite());
+        assert!(LinearAxis::over(std::iter::empty()).share(0.5).is_finite());
     }
 }

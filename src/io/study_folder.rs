@@ -21,7 +21,7 @@ use crate::parameter_study::{ParameterStudy, Points, parse};
 /// What was planned.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
+pub struct StudyPlan {
     /// Of this program: units of another would find something else.
     pub version: String,
     /// Of the study's text.
@@ -40,7 +40,7 @@ pub struct Plan {
 /// What came of a unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Outcome {
+pub struct UnitOutcome {
     pub version: String,
     /// As the plan's.
     pub study: String,
@@ -61,7 +61,7 @@ pub struct Outcome {
 
 /// What a unit took.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Cost {
+pub struct UnitCost {
     pub unit: usize,
     pub cpu_seconds: f64,
     pub seconds: f64,
@@ -73,7 +73,7 @@ pub struct Cost {
 pub struct StudyFolder {
     pub folder: PathBuf,
     pub study: ParameterStudy,
-    pub plan: Plan,
+    pub plan: StudyPlan,
 }
 
 const STUDY: &str = "study.toml";
@@ -124,7 +124,7 @@ impl StudyFolder {
         } else {
             home
         };
-        let plan = Plan {
+        let plan = StudyPlan {
             version: env!("CARGO_PKG_VERSION").into(),
             study: fingerprint(&text),
             base,
@@ -169,7 +169,7 @@ impl StudyFolder {
                 "no study was planned here: hapdef study plan STUDY --out FOLDER",
             ));
         }
-        let plan: Plan = serde_json::from_str(&source::read_text(&path)?).map_err(|e| {
+        let plan: StudyPlan = serde_json::from_str(&source::read_text(&path)?).map_err(|e| {
             FileError::broken(&path, format!("this is no plan ({e}). Plan the study anew"))
         })?;
         let (study, text) = read_study(&folder.join(STUDY))?;
@@ -211,7 +211,7 @@ impl StudyFolder {
     ///
     /// # Errors
     /// [`FileError`] when either cannot be written.
-    pub fn write(&self, outcome: &Outcome, cost: &Cost) -> Result<(), FileError> {
+    pub fn write(&self, outcome: &UnitOutcome, cost: &UnitCost) -> Result<(), FileError> {
         let path = self.result_path(outcome.unit);
         let text =
             serde_json::to_string_pretty(outcome).map_err(|e| FileError::broken(&path, e))?;
@@ -227,14 +227,14 @@ impl StudyFolder {
     ///
     /// # Errors
     /// [`FileError`] where there is something that cannot be read.
-    pub fn outcome(&self, unit: usize) -> Result<Option<Outcome>, FileError> {
+    pub fn outcome(&self, unit: usize) -> Result<Option<UnitOutcome>, FileError> {
         let path = self.result_path(unit);
         let text = match source::read_text(&path) {
             Ok(text) => text,
             Err(FileError::Missing { .. }) => return Ok(None),
             Err(error) => return Err(error),
         };
-        let outcome: Outcome = serde_json::from_str(&text).map_err(|e| {
+        let outcome: UnitOutcome = serde_json::from_str(&text).map_err(|e| {
             FileError::broken(
                 &path,
                 format!("this is no result ({e}). Remove it and run the unit again"),
@@ -252,7 +252,7 @@ impl StudyFolder {
 
     /// What a unit took, where that is known.
     #[must_use]
-    pub fn cost(&self, unit: usize) -> Option<Cost> {
+    pub fn cost(&self, unit: usize) -> Option<UnitCost> {
         let path = self.folder.join(COSTS).join(format!("{unit:06}.json"));
         serde_json::from_str(&source::read_text(&path).ok()?).ok()
     }

@@ -21,7 +21,7 @@ pub struct Marker {
 
 /// A side to look from: towards the viewer, and up.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub struct ViewSide {
     pub name: &'static str,
     pub toward: DVec3,
     pub up: DVec3,
@@ -29,7 +29,7 @@ pub struct View {
 
 /// The sides a report shows, named as in the window.
 #[must_use]
-pub fn standard_views(stance: Stance) -> [View; 4] {
+pub fn standard_views(stance: Stance) -> [ViewSide; 4] {
     let (up, front, right) = (stance.up(), stance.front(), stance.right());
     [
         ("front", front),
@@ -37,7 +37,7 @@ pub fn standard_views(stance: Stance) -> [View; 4] {
         ("back", -front),
         ("left", -right),
     ]
-    .map(|(name, toward)| View {
+    .map(|(name, toward)| ViewSide {
         name,
         toward: (toward + up * 0.25).normalize(),
         up,
@@ -49,12 +49,18 @@ const ACCENT: &str = "#d55e00";
 /// The limb from one side: facets painted from the back, coloured by `paint`, the gauges
 /// numbered. Gauges on the far side are drawn hollow.
 #[must_use]
-pub fn limb(mesh: &TriMesh, paint: Paint, markers: &[Marker], view: &View, width: f64) -> String {
+pub fn limb(
+    mesh: &TriMesh,
+    paint: Paint,
+    markers: &[Marker],
+    view: &ViewSide,
+    width: f64,
+) -> String {
     let right = view.up.cross(view.toward).normalize();
     let frame = DMat3::from_cols(right, view.toward.cross(right), view.toward).transpose();
     let seen: Vec<DVec3> = mesh.positions().iter().map(|&p| frame * p).collect();
     let (lower, upper) = bounds(seen.iter().map(|p| p.truncate()));
-    let canvas = Canvas::new(lower, upper, width);
+    let canvas = SvgCanvas::new(lower, upper, width);
     let mut svg = canvas.open(&format!("The limb from the {}", view.name));
     for t in from_behind(mesh.triangles(), &seen) {
         let tri = mesh.triangles()[t];
@@ -92,7 +98,7 @@ pub fn from_behind(triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<usize> {
 /// The limb laid flat, its axis up, with its size in millimetres; hatched where lengths are not kept.
 #[must_use]
 pub fn unrolled(flat: &Flat, paint: Paint, markers: &[Marker], width: f64) -> String {
-    let canvas = Canvas::new(flat.lower, flat.upper, width);
+    let canvas = SvgCanvas::new(flat.lower, flat.upper, width);
     let mut svg = canvas.open("The limb unrolled, with numbered gauges");
     let corners = |tri: &[u32; 3]| tri.map(|v| canvas.place(flat.positions[v as usize].truncate()));
     for t in from_behind(&flat.triangles, &flat.positions) {
@@ -139,7 +145,7 @@ fn hatch(svg: &mut String, outlines: &str) {
 }
 
 /// One line of a plot: name, colour-blind-safe colour and points.
-pub struct Series<'a> {
+pub struct PlotSeries<'a> {
     pub name: &'a str,
     pub points: Vec<(f64, f64)>,
 }
@@ -151,7 +157,13 @@ pub const PALETTE: [&str; 6] = [
 
 /// A line plot with axes, ticks and a legend.
 #[must_use]
-pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series], width: f64) -> String {
+pub fn plot(
+    title: &str,
+    x_label: &str,
+    y_label: &str,
+    series: &[PlotSeries],
+    width: f64,
+) -> String {
     let (height, left, bottom) = (0.55 * width, 58.0, 44.0);
     let all = || {
         series
@@ -261,14 +273,14 @@ pub fn escape(text: &str) -> String {
 
 const PAD: f64 = 14.0;
 
-struct Canvas {
+struct SvgCanvas {
     lower: DVec2,
     scale: f64,
     width: f64,
     height: f64,
 }
 
-impl Canvas {
+impl SvgCanvas {
     fn new(lower: DVec2, upper: DVec2, width: f64) -> Self {
         let size = (upper - lower).max(DVec2::splat(1e-9));
         let scale = (width / size.x).min(1.4 * width / size.y);

@@ -10,13 +10,13 @@ use crate::plain::quote;
 const LINE: usize = 1 << 25;
 
 /// A table with named columns.
-pub struct Table {
+pub struct NamedTable {
     path: PathBuf,
     text: String,
     names: csv::StringRecord,
 }
 
-impl Table {
+impl NamedTable {
     /// Reads the whole table and takes its first line apart.
     ///
     /// # Errors
@@ -104,15 +104,15 @@ impl Table {
     }
 
     /// The rows below the first line.
-    pub fn rows(&self) -> impl Iterator<Item = Result<Row<'_>, FileError>> {
+    pub fn rows(&self) -> impl Iterator<Item = Result<TableRow<'_>, FileError>> {
         reader(&self.text)
             .into_records()
             .map(move |record| self.row(record))
     }
 
-    fn row(&self, record: csv::Result<csv::StringRecord>) -> Result<Row<'_>, FileError> {
+    fn row(&self, record: csv::Result<csv::StringRecord>) -> Result<TableRow<'_>, FileError> {
         let cells = record.map_err(|e| self.unreadable(&e))?;
-        Ok(Row {
+        Ok(TableRow {
             table: self,
             line: self.line(cells.position()),
             cells,
@@ -167,13 +167,13 @@ fn reader(text: &str) -> csv::Reader<&[u8]> {
 }
 
 /// One row of a table.
-pub struct Row<'a> {
-    table: &'a Table,
+pub struct TableRow<'a> {
+    table: &'a NamedTable,
     line: u64,
     cells: csv::StringRecord,
 }
 
-impl Row<'_> {
+impl TableRow<'_> {
     /// The line it stands in, from 1.
     #[must_use]
     pub fn line(&self) -> u64 {
@@ -205,7 +205,7 @@ impl Row<'_> {
     /// The finite numbers in some columns.
     ///
     /// # Errors
-    /// As [`Row::number`].
+    /// As [`TableRow::number`].
     pub fn numbers<const N: usize>(&self, columns: &[usize; N]) -> Result<[f64; N], FileError> {
         let mut numbers = [0.0; N];
         for (number, &column) in numbers.iter_mut().zip(columns) {
@@ -262,7 +262,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("t.csv");
             std::fs::write(&path, format!("\u{feff}{text}")).unwrap();
-            let table = Table::read(&path).unwrap();
+            let table = NamedTable::read(&path).unwrap();
             let lines: Vec<u64> = table.rows().map(|row| row.unwrap().line()).collect();
             assert_eq!(lines, [2, 5, 6], "{end:?}");
         }

@@ -5,7 +5,7 @@
 //!
 //! | array | shape | is |
 //! |---|---|---|
-//! | `header` | bytes | [`Header`] |
+//! | `header` | bytes | [`EstimatorHeader`] |
 //! | `channel_middle`, `channel_spread` | channels | asinh((reading - middle) / spread); spread 0: left out |
 //! | `channel_mean`, `channel_deviation` | channels | what that is standardized by; 0: left out |
 //! | `place_lengths` | features | what each feature is divided by |
@@ -19,7 +19,7 @@
 //!
 //! | array | shape | is |
 //! |---|---|---|
-//! | `header` | bytes | [`Header`] |
+//! | `header` | bytes | [`EstimatorHeader`] |
 //! | `map_positions`, `map_triangles` | × 3 | the surface that readings are known on |
 //! | `readings` | maps × nodes × channels | of a newton at the vertices and the middles of the edges: what it reads, how far off that may be, then by the tip's size (1) and along the axes (3) where `asked` has them |
 //! | `ratios` | touches | errors over the radius, of touches that nothing was learned from |
@@ -34,14 +34,14 @@ use super::FileError;
 use super::npz::{Arrays, NpzFile};
 use crate::design::Learned;
 
-use self::header::By;
-pub use self::header::{Header, Origin, Update, fingerprint};
+use self::header::EstimatorSection;
+pub use self::header::{EstimatorHeader, TrainingOrigin, UpdateSection, fingerprint};
 
 /// An estimator with what is known of it.
 #[derive(Clone, Debug)]
 pub struct TouchFile {
     /// Where it comes from and how well it does.
-    pub header: Header,
+    pub header: EstimatorHeader,
     /// What answers.
     pub estimator: Learned,
 }
@@ -50,8 +50,8 @@ pub struct TouchFile {
 ///
 /// # Errors
 /// [`FileError`] naming the file.
-pub fn write(path: &Path, origin: Origin, estimator: &Learned) -> Result<(), FileError> {
-    let header = Header::new(origin, estimator);
+pub fn write(path: &Path, origin: TrainingOrigin, estimator: &Learned) -> Result<(), FileError> {
+    let header = EstimatorHeader::new(origin, estimator);
     let text = serde_json::to_string(&header)
         .map_err(|e| FileError::broken(path, format!("the header cannot be written: {e}")))?;
     let build = || -> std::io::Result<NpzFile> {
@@ -79,13 +79,13 @@ pub fn read(path: &Path) -> Result<TouchFile, FileError> {
             "this is no trained estimator: it has no header. Make one with hapdef train",
         ));
     }
-    let header = Header::read(path, &found.numbers("header")?.values)?;
+    let header = EstimatorHeader::read(path, &found.numbers("header")?.values)?;
     let estimator = match &header.by {
-        By::Regression(entry) => {
+        EstimatorSection::Regression(entry) => {
             let estimator = arrays::read(path, &mut found, header.channels, entry)?;
             Learned::Regression(Box::new(estimator))
         }
-        By::Matching(known) => {
+        EstimatorSection::Matching(known) => {
             let taught = taught_map::read(path, &mut found, header.channels, known.matching)?;
             Learned::Matching(Box::new(taught))
         }

@@ -9,9 +9,9 @@ use faer::Mat;
 use super::{FileError, atomic};
 use crate::learning::doubt::NEAR;
 use crate::learning::kernel::Kernel;
-use crate::learning::machine::{By, Machine};
+use crate::learning::machine::{AnswerRule, Regression};
 use crate::learning::portable::{Precision, answer, kept, trials};
-use crate::learning::{Answer, TouchEstimator};
+use crate::learning::{Estimate, TouchEstimator};
 
 /// Readings that are written along.
 const TRIALS: usize = 64;
@@ -21,11 +21,11 @@ pub const AGREES_MM: f64 = 0.01;
 pub const FILES: [&str; 3] = ["touch.h", "touch.c", "touch_test.c"];
 
 /// An estimator ready to be written.
-pub struct Source<'a> {
+pub struct EstimatorSource<'a> {
     estimator: &'a TouchEstimator,
     pub precision: Precision,
     /// Readings with the answers of the program.
-    trials: Vec<(Vec<f64>, Answer)>,
+    trials: Vec<(Vec<f64>, Estimate)>,
     /// The farthest that the board's answers are from these (mm), as far as it is foreseen.
     pub off_mm: f64,
 }
@@ -43,7 +43,7 @@ pub struct Needs {
     pub functions: usize,
 }
 
-impl<'a> Source<'a> {
+impl<'a> EstimatorSource<'a> {
     /// In the precision that is asked for, or in single precision where its answers agree with the program's.
     #[must_use]
     pub fn new(estimator: &'a TouchEstimator, asked: Option<Precision>) -> Self {
@@ -53,9 +53,9 @@ impl<'a> Source<'a> {
             .collect();
         let x = crate::dataset::SignalMatrix::new(readings.len(), all);
         let answers = estimator.find(&x);
-        let trials: Vec<(Vec<f64>, Answer)> = readings.into_iter().zip(answers).collect();
+        let trials: Vec<(Vec<f64>, Estimate)> = readings.into_iter().zip(answers).collect();
         let off = |precision: Precision| {
-            let apart = |(reading, right): &(Vec<f64>, Answer)| {
+            let apart = |(reading, right): &(Vec<f64>, Estimate)| {
                 let found = answer(estimator, reading, precision);
                 let squares = (0..3).map(|a| (found.place_mm[a] - right.place_mm[a]).powi(2));
                 squares.sum::<f64>().sqrt()
@@ -85,13 +85,13 @@ impl<'a> Source<'a> {
         let live = e.inputs.live().len();
         let machines = [Some(&e.place), e.force.as_ref().map(|f| &f.machine)];
         let machines = machines.into_iter().flatten();
-        let table = |m: &Machine| {
+        let table = |m: &Regression| {
             let outputs = match &m.by {
-                By::Kernel { weights, .. } => weights.ncols(),
-                By::Nearest { outputs, .. } => outputs.ncols(),
+                AnswerRule::Kernel { weights, .. } => weights.ncols(),
+                AnswerRule::Nearest { outputs, .. } => outputs.ncols(),
             };
             let points = m.points.nrows();
-            let kernels = usize::from(matches!(m.by, By::Kernel { .. }));
+            let kernels = usize::from(matches!(m.by, AnswerRule::Kernel { .. }));
             (
                 points * (live + outputs),
                 points * (3 * live + 2 * outputs + 4),
@@ -226,7 +226,7 @@ impl<'a> Source<'a> {
     }
 
     /// The tables of a machine and the function that runs it.
-    fn machine(&self, text: &mut String, name: &str, machine: &Machine, f: &str) {
+    fn machine(&self, text: &mut String, name: &str, machine: &Regression, f: &str) {
         let rows = |m: &Mat<f64>| -> Vec<f64> {
             m.row_iter()
                 .flat_map(|r| r.iter().copied().collect::<Vec<_>>())
@@ -234,8 +234,8 @@ impl<'a> Source<'a> {
         };
         let upper = name.to_uppercase();
         let (points, outputs) = match &machine.by {
-            By::Kernel { weights, .. } => (machine.points.nrows(), weights.ncols()),
-            By::Nearest { outputs, .. } => (machine.points.nrows(), outputs.ncols()),
+            AnswerRule::Kernel { weights, .. } => (machine.points.nrows(), weights.ncols()),
+            AnswerRule::Nearest { outputs, .. } => (machine.points.nrows(), outputs.ncols()),
         };
         let _ = write!(
             text,
@@ -253,11 +253,11 @@ impl<'a> Source<'a> {
             rows(&machine.points).into_iter(),
         );
         match &machine.by {
-            By::Kernel { weights, bias, .. } => {
+            AnswerRule::Kernel { weights, bias, .. } => {
                 self.table(text, &format!("{name}_weights"), rows(weights).into_iter());
                 self.table(text, &format!("{name}_bias"), bias.iter().copied());
             }
-            By::Nearest { outputs, .. } => {
+            AnswerRule::Nearest { outputs, .. } => {
                 self.table(text, &format!("{name}_known"), rows(outputs).into_iter());
             }
         }
@@ -265,7 +265,7 @@ impl<'a> Source<'a> {
             text,
             "\n/* The outputs for some features, and the known touches near by, nearest first: how many. */\nstatic int {name}_run(const touch_real features[LIVE], touch_real *out, touch_real *near_squared, unsigned short *near_number) {{\n  touch_real asked[LIVE];\n  int i, j, k, found = 0;\n  for (j = 0; j < LIVE; j++) asked[j] = features[j] / {name}_lengths[j];\n"
         );
-        if let By::Kernel { .. } = machine.by {
+        if let AnswerRule::Kernel { .. } = machine.by {
             let _ = writeln!(
                 text,
                 "  for (k = 0; k < {upper}_OUTPUTS; k++) out[k] = {name}_bias[k];"
@@ -276,7 +276,7 @@ impl<'a> Source<'a> {
             "  for (i = 0; i < {upper}_POINTS; i++) {{\n    const touch_real *point = {name}_points + (long)i * LIVE;\n    touch_real squared = 0;\n    for (j = 0; j < LIVE; j++) {{\n      touch_real apart = asked[j] - point[j];\n      squared += apart * apart;\n    }}\n    if (found < {upper}_KEPT || squared < near_squared[found - 1]) {{\n      k = found < {upper}_KEPT ? found++ : found - 1;\n      for (; k > 0 && near_squared[k - 1] > squared; k--) {{\n        near_squared[k] = near_squared[k - 1];\n        near_number[k] = near_number[k - 1];\n      }}\n      near_squared[k] = squared;\n      near_number[k] = (unsigned short)i;\n    }}\n"
         );
         match &machine.by {
-            By::Kernel { kernel, .. } => {
+            AnswerRule::Kernel { kernel, .. } => {
                 let value = match kernel {
                     Kernel::Gaussian => format!("exp{f}({} * squared)", self.number(-0.5)),
                     Kernel::Matern => format!("(1 + r + r * r / 3) * exp{f}(-r)"),
@@ -291,7 +291,7 @@ impl<'a> Source<'a> {
                     "      touch_real value = {value};\n      for (k = 0; k < {upper}_OUTPUTS; k++) out[k] += value * {name}_weights[(long)i * {upper}_OUTPUTS + k];\n    }}\n  }}\n"
                 );
             }
-            By::Nearest { count, .. } => {
+            AnswerRule::Nearest { count, .. } => {
                 let count = (*count).min(machine.points.nrows());
                 let least = self.number(1e-12);
                 let _ = write!(

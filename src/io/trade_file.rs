@@ -17,24 +17,26 @@ use crate::design::Inputs;
 use crate::placement::SelectorKind;
 use crate::plain;
 use crate::project::{BudgetKeys, LiveKeys, Project};
-use crate::trade::{Bought, Knob, KnobReport, Measured, Point, Setting, Spent, front, knobs};
+use crate::trade::{
+    Bought, Knob, KnobReport, Measured, Spent, TradePoint, TradeSetting, front, knobs,
+};
 
 /// Everything that was measured of one project on one machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct TradeRecord {
     pub format: u32,
     /// Of the program: its figures are not those of another.
     pub version: String,
     /// What the points hold for ([`inputs_key`]).
     pub inputs: String,
     pub threads: usize,
-    pub judge: Judge,
-    pub points: Vec<Point>,
+    pub judge: TradeJudge,
+    pub points: Vec<TradePoint>,
 }
 
 /// The model that all points were judged by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Judge {
+pub struct TradeJudge {
     pub element_mm: f64,
     pub unknowns: usize,
     pub touches: usize,
@@ -43,7 +45,7 @@ pub struct Judge {
 /// 2: settings say which estimator they are judged by, and what expected error looks at.
 const FORMAT: u32 = 2;
 
-impl Record {
+impl TradeRecord {
     /// Nothing measured yet.
     #[must_use]
     pub fn new(inputs: &Inputs, threads: usize) -> Self {
@@ -52,7 +54,7 @@ impl Record {
             version: env!("CARGO_PKG_VERSION").into(),
             inputs: inputs_key(inputs),
             threads,
-            judge: Judge::default(),
+            judge: TradeJudge::default(),
             points: Vec::new(),
         }
     }
@@ -63,7 +65,7 @@ impl Record {
         self.version == env!("CARGO_PKG_VERSION") && self.inputs == inputs_key(inputs)
     }
 
-    /// From what [`Record::to_json`] wrote.
+    /// From what [`TradeRecord::to_json`] wrote.
     ///
     /// # Errors
     /// What is wrong with the text.
@@ -148,7 +150,7 @@ fn beside_defaults(value: Value, defaults: &Value) -> Option<Value> {
 ///
 /// # Errors
 /// [`FileError`] for a file that is there and is no trade.
-pub fn read(folder: &Path) -> Result<Option<Record>, FileError> {
+pub fn read(folder: &Path) -> Result<Option<TradeRecord>, FileError> {
     let path = folder.join("trade.json");
     let text = match source::read_text(&path) {
         Ok(text) => text,
@@ -161,14 +163,14 @@ pub fn read(folder: &Path) -> Result<Option<Record>, FileError> {
             format!("this is no measured trade ({m}). Choose another folder"),
         )
     };
-    Record::parse(&text).map(Some).map_err(broken)
+    TradeRecord::parse(&text).map(Some).map_err(broken)
 }
 
 /// Puts `trade.json`, `trade.csv`, `trade.md` and `trade.svg` into a folder, all of one record.
 ///
 /// # Errors
 /// [`FileError`] naming what could not be written.
-pub fn write(place: &Together, project: &Project, record: &Record) -> Result<(), FileError> {
+pub fn write(place: &Together, project: &Project, record: &TradeRecord) -> Result<(), FileError> {
     let files = [
         ("trade.json", record.to_json()),
         ("trade.csv", csv(project, record)),
@@ -182,7 +184,7 @@ pub fn write(place: &Together, project: &Project, record: &Record) -> Result<(),
 
 /// A row a point: what it cost and achieved, and its setting. What nothing uses at a setting is left empty.
 #[must_use]
-pub fn csv(project: &Project, record: &Record) -> String {
+pub fn csv(project: &Project, record: &TradeRecord) -> String {
     let best = front(project, &record.points);
     let columns = ["on_front"].into_iter().chain(FIGURES).chain(KEYS);
     let mut table = Writing::new(columns.chain(["failed"]));
@@ -248,7 +250,7 @@ const KEYS: [&str; 17] = [
     "tuning_touches",
 ];
 
-fn keys(s: &Setting) -> [String; KEYS.len()] {
+fn keys(s: &TradeSetting) -> [String; KEYS.len()] {
     let unexplained = s.uses(Knob::Unexplained).then(|| s.unexplained.to_string());
     let limit = |knob: Knob, value: fn(&Spent) -> String| match &s.limits {
         Some(spent) if s.uses(knob) => value(spent),
@@ -279,7 +281,7 @@ fn keys(s: &Setting) -> [String; KEYS.len()] {
 
 /// The front and the knobs as tables to read.
 #[must_use]
-pub fn markdown(project: &Project, record: &Record) -> String {
+pub fn markdown(project: &Project, record: &TradeRecord) -> String {
     let count = record
         .points
         .iter()
@@ -340,9 +342,9 @@ pub fn markdown(project: &Project, record: &Record) -> String {
 }
 
 /// Those points of a front that are better than the last one kept by a figure that is worth a row.
-fn thinned<'a>(front: &[&'a Point]) -> Vec<&'a Point> {
+fn thinned<'a>(front: &[&'a TradePoint]) -> Vec<&'a TradePoint> {
     const WORTH: f64 = 0.05;
-    let mut kept: Vec<&Point> = Vec::new();
+    let mut kept: Vec<&TradePoint> = Vec::new();
     let mut last = f64::INFINITY;
     for (k, point) in front.iter().enumerate() {
         let error = point.measured().map_or(f64::INFINITY, |m| m.error_mm);
@@ -370,13 +372,13 @@ mod tests {
     #[test]
     fn a_record_of_another_format_is_named_as_that() {
         let old = r#"{ "format": 1, "points": [{ "setting": { "estimator": "regression" } }] }"#;
-        let said = Record::parse(old).unwrap_err();
+        let said = TradeRecord::parse(old).unwrap_err();
         assert_eq!(said, "it is of format 1, this version reads 2");
     }
 
     #[test]
     fn what_is_quoted_of_a_record_stays_within_its_marks() {
-        let said = Record::parse(r#"  "fo\\\"rm\u0007 of old""#).unwrap_err();
+        let said = TradeRecord::parse(r#"  "fo\\\"rm\u0007 of old""#).unwrap_err();
         let quoted = "“fo\\\\\\\"rm\\u{7} of old”";
         assert_eq!(
             said,
@@ -396,7 +398,7 @@ mod tests {
     #[test]
     fn tables_have_what_a_setting_hears() {
         let project = Project::around("a.stl", None);
-        let centre = keys(&Setting::centre(&project));
+        let centre = keys(&TradeSetting::centre(&project));
         let value = |key: &str| {
             let at = KEYS.iter().position(|k| *k == key).unwrap();
             centre[at].as_str()

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::convex::{Body, bar, block};
+use super::convex::{Hull, bar, block};
 use super::frame::JigFrame;
 use super::pad::Pad;
 use super::sizes::Sizes;
@@ -33,7 +33,7 @@ pub const LEAST_TRAVEL: f64 = 2.0;
 /// How far a ring reaches towards its strut (mm).
 pub const TAB: f64 = 1.2;
 /// Ring, strut, guide and pad.
-pub type Bodies = [Body; 4];
+pub type Bodies = [Hull; 4];
 /// What lies on something does not meet it (mm).
 const TOUCHING: f64 = 0.05;
 /// How high the eyelet of the cord stands on a guide (mm).

@@ -9,7 +9,7 @@ use super::frame::JigFrame;
 use crate::mesh::TriMesh;
 
 /// The hull of these points (mm).
-pub type Body = Vec<DVec3>;
+pub type Hull = Vec<DVec3>;
 
 /// A part that is in the way, in a frame.
 pub struct Obstacle {
@@ -64,13 +64,13 @@ fn around(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
 
 /// All that a body passes on a straight way.
 #[must_use]
-pub fn swept(body: &[DVec3], by: DVec3) -> Body {
+pub fn swept(body: &[DVec3], by: DVec3) -> Hull {
     body.iter().flat_map(|&p| [p, p + by]).collect()
 }
 
 /// The corners of a box: from and to along x, y and z, turned about z by an angle (radians).
 #[must_use]
-pub fn block(from: DVec3, to: DVec3, angle: f64) -> Body {
+pub fn block(from: DVec3, to: DVec3, angle: f64) -> Hull {
     let turn = DVec2::from_angle(angle);
     (0..8)
         .map(|k| {
@@ -83,7 +83,7 @@ pub fn block(from: DVec3, to: DVec3, angle: f64) -> Body {
 
 /// A round bar along z, as a prism around it.
 #[must_use]
-pub fn bar(radius: f64, from: f64, to: f64) -> Body {
+pub fn bar(radius: f64, from: f64, to: f64) -> Hull {
     const SIDES: u32 = 32;
     let around = radius / (std::f64::consts::PI / f64::from(SIDES)).cos();
     (0..SIDES)
@@ -124,12 +124,12 @@ mod tests {
     #[test]
     fn bodies_meet_where_they_do() {
         let cube = block(DVec3::ZERO, DVec3::ONE, 0.0);
-        let beyond: Body = cube.iter().map(|p| *p + DVec3::X * 1.5).collect();
+        let beyond: Hull = cube.iter().map(|p| *p + DVec3::X * 1.5).collect();
         assert!(!meet(&cube, &beyond));
         assert!(meet(&swept(&cube, DVec3::X), &beyond));
         // Turned by an eighth it reaches farther.
         let turned = block(DVec3::splat(-0.5), DVec3::splat(0.5), 0.0);
-        let beside: Body = turned.iter().map(|p| *p + DVec3::X * 1.1).collect();
+        let beside: Hull = turned.iter().map(|p| *p + DVec3::X * 1.1).collect();
         assert!(!meet(&turned, &beside));
         let eighth = block(
             DVec3::splat(-0.5),

@@ -12,7 +12,7 @@ const SEGMENTS: [u8; 10] = [
 
 /// How numbers are written (mm).
 #[derive(Clone, Copy, Debug)]
-pub struct Hand {
+pub struct Lettering {
     /// Width and height of a digit, between the middles of its strokes.
     pub size: DVec2,
     /// Of a stroke.
@@ -24,7 +24,7 @@ pub struct Hand {
 /// A number around the origin, in the plane of x and y, standing out along z from a little below it, so that it holds on what it
 /// is put on.
 #[must_use]
-pub fn number(number: usize, hand: &Hand) -> JigSolid {
+pub fn number(number: usize, hand: &Lettering) -> JigSolid {
     /// How deep it is sunk (mm).
     const SUNK: f64 = 0.4;
     let digits: Vec<usize> = number

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::arm::{Arm, EYELET, TAB};
 use super::convex::block;
-use super::digits::{Hand, facing, number};
+use super::digits::{Lettering, facing, number};
 use super::pad::{ACROSS, ALONG, Pad};
 use super::plan::{Jig, Stack};
 use super::rod::HEAD;
@@ -19,7 +19,7 @@ use crate::mesh::Facets;
 
 /// One that is printed.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct PrintedPart {
     /// Of its file, without the ending.
     pub name: String,
     /// As it sits on its rod, pads at the wall (mm, in the stack's frame).
@@ -41,16 +41,16 @@ const TO_PIN: f64 = 2.5;
 
 /// All pieces of a stack of a jig, in the order in which they are put onto the rod.
 #[must_use]
-pub fn parts(jig: &Jig, stack: &Stack) -> Vec<Part> {
+pub fn parts(jig: &Jig, stack: &Stack) -> Vec<PrintedPart> {
     let sizes = &jig.sizes;
     let mut parts = rod(sizes, stack);
     for (k, arm) in stack.arms.iter().enumerate().rev() {
-        parts.push(Part {
+        parts.push(PrintedPart {
             name: format!("ring-{:02}", arm.number),
             solid: read(&ring(sizes, arm)),
             print_turn: DMat3::IDENTITY,
         });
-        parts.push(Part {
+        parts.push(PrintedPart {
             name: format!("pad-{:02}", arm.number),
             solid: read(&pad(sizes, arm)),
             // On a side of its stem.
@@ -74,7 +74,7 @@ fn shaft(sizes: &Sizes, play: f64, from: f64, to: f64) -> JigSolid {
 }
 
 /// The rod, in as many pieces as the printer needs: each sits on the one before with a peg.
-fn rod(sizes: &Sizes, stack: &Stack) -> Vec<Part> {
+fn rod(sizes: &Sizes, stack: &Stack) -> Vec<PrintedPart> {
     /// Length of a peg (mm).
     const PEG: f64 = 12.0;
     let foot = -stack.lift - SEAT - GRIP;
@@ -118,7 +118,7 @@ fn rod(sizes: &Sizes, stack: &Stack) -> Vec<Part> {
             } else {
                 format!("-{}", k + 1)
             };
-            Part {
+            PrintedPart {
                 name: format!("rod-{}{of}", stack.letter),
                 solid: read(&piece),
                 print_turn,
@@ -129,7 +129,7 @@ fn rod(sizes: &Sizes, stack: &Stack) -> Vec<Part> {
 
 /// What rests on the rim: four spokes, of which the one with the arrow points to the part's front. Where something sticks out of
 /// the opening it stands on feet.
-fn seat(sizes: &Sizes, stack: &Stack) -> Part {
+fn seat(sizes: &Sizes, stack: &Stack) -> PrintedPart {
     const WIDTH: f64 = 8.0;
     let (low, high) = (-stack.lift - SEAT, -stack.lift);
     let spokes = [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y].map(|way| {
@@ -162,7 +162,7 @@ fn seat(sizes: &Sizes, stack: &Stack) -> Part {
     let body = joined(spokes.into_iter().chain([hub]).collect());
     // Cut into its outside, which lies on the printer's bed.
     let cut = shaft(sizes, sizes.play, low - 2.0, high + 1.0).union(&hull(&arrow));
-    Part {
+    PrintedPart {
         name: format!("seat-{}", stack.letter),
         solid: read(&body.difference(&cut)),
         print_turn: DMat3::IDENTITY,
@@ -191,7 +191,7 @@ fn rim(stack: &Stack, way: DVec2) -> [f64; 2] {
 }
 
 /// The sleeve between a ring and the one before it, or the seat; nothing where they lie on each other.
-fn sleeve(sizes: &Sizes, stack: &Stack, k: usize) -> Option<Part> {
+fn sleeve(sizes: &Sizes, stack: &Stack, k: usize) -> Option<PrintedPart> {
     let to = stack.arms[k].ring(sizes)[0];
     let from = match k {
         0 => -stack.lift,
@@ -204,7 +204,7 @@ fn sleeve(sizes: &Sizes, stack: &Stack, k: usize) -> Option<Part> {
     let mut body =
         cylinder(radius, from, to).difference(&shaft(sizes, sizes.play, from - 1.0, to + 1.0));
     if to - from > 6.0 {
-        let hand = Hand {
+        let hand = Lettering {
             size: DVec2::new(2.0, 3.2),
             stroke: 0.7,
             raised: 0.4,
@@ -213,7 +213,7 @@ fn sleeve(sizes: &Sizes, stack: &Stack, k: usize) -> Option<Part> {
         let at = DVec3::new(-radius + 0.2, 0.0, f64::midpoint(from, to));
         body = body.union(&placed(&sign, facing(DVec3::NEG_Y, DVec3::NEG_X), at));
     }
-    Some(Part {
+    Some(PrintedPart {
         name: format!("sleeve-{}{}", stack.letter, k + 1),
         solid: read(&body),
         print_turn: DMat3::IDENTITY,
@@ -241,7 +241,7 @@ fn ring(sizes: &Sizes, arm: &Arm) -> JigSolid {
         DVec3::new(to - 3.0, -half, z - half - EYELET),
         DVec3::new(to, half, z - half + 0.5),
     );
-    let hand = Hand {
+    let hand = Lettering {
         size: DVec2::new(2.0, 3.6),
         stroke: 0.7,
         raised: 0.5,
@@ -296,7 +296,7 @@ fn pad(sizes: &Sizes, arm: &Arm) -> JigSolid {
     );
     let stem = turned(&stem.difference(&pin), arm.angle);
     let room = pad.half.x - sizes.stem / 2.0_f64.sqrt();
-    let hand = Hand {
+    let hand = Lettering {
         size: DVec2::new(0.3 * room, (1.2 * pad.half.y).min(4.0)),
         stroke: 0.6,
         raised: 0.5,

@@ -6,11 +6,11 @@ use super::arm::{Arm, Bodies};
 use super::convex::{meet, swept};
 use super::frame::{Entry, JigFrame};
 use super::reach::RodReach;
-use super::rod::{Interior, Line, cover};
+use super::rod::{Interior, RodLine, cover};
 use super::sizes::Sizes;
 use super::slots::slots;
 use super::wall::{PressedGauge, Wall};
-use super::why::{LeftOut, Why};
+use super::why::{LeftOutGauge, Why};
 use crate::budget::{Cancelled, Watch};
 
 /// A rod with its arms, brought in together.
@@ -39,7 +39,7 @@ pub struct Jig {
     /// One after another: a second one for what does not fit beside the first, or comes in at the other end.
     pub stacks: Vec<Stack>,
     /// What must be pressed by hand.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<LeftOutGauge>,
 }
 
 /// A jig for gauges with a film of half these sizes (mm).
@@ -69,7 +69,7 @@ pub fn plan(
     let lines = rods.iter().map(|rod| rod.line).collect();
     for rod in rods {
         let (passes, refused) = passes(&interior, rod.line, rod.arms);
-        left_out.extend(refused.iter().map(|arm| LeftOut {
+        left_out.extend(refused.iter().map(|arm| LeftOutGauge {
             number: arm.number,
             why: Why::Arm,
         }));
@@ -105,7 +105,7 @@ fn letter(k: usize) -> String {
 
 /// Arms that fit beside each other, in as few goes as a greedy search finds: each arm in the first that it fits into.
 /// Those come after them that do not even fit alone, with the seat in the way.
-fn passes(interior: &Interior, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) {
+fn passes(interior: &Interior, line: RodLine, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) {
     let mut passes: Vec<Vec<Arm>> = Vec::new();
     let mut refused = Vec::new();
     for arm in arms {
@@ -155,7 +155,7 @@ fn space_rings(sizes: &Sizes, arms: &mut [Arm]) {
 
 /// Whether all arms (from the opening inwards) get in, are slid on one after another from the innermost, and have their
 /// pads pressed without meeting each other.
-fn fit(interior: &Interior, line: Line, arms: &[Arm]) -> bool {
+fn fit(interior: &Interior, line: RodLine, arms: &[Arm]) -> bool {
     /// How far a strut may rise over its length.
     const STEEP: f64 = 1.2;
     let sizes = &interior.sizes;

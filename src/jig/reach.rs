@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::rod::{Interior, Line, cover};
+use super::rod::{Interior, RodLine, cover};
 use super::wall::{PressedGauge, Wall};
 use crate::budget::{Cancelled, Watch};
 use crate::gauge::Gauge;
@@ -10,7 +10,7 @@ use crate::gauge::Gauge;
 /// The rods that get to most of a part.
 pub struct RodReach {
     interior: Interior,
-    lines: Vec<Line>,
+    lines: Vec<RodLine>,
 }
 
 impl RodReach {
@@ -35,7 +35,7 @@ impl RodReach {
 
     /// Of rods on these lines.
     #[must_use]
-    pub fn of(interior: Interior, lines: Vec<Line>) -> Self {
+    pub fn of(interior: Interior, lines: Vec<RodLine>) -> Self {
         Self { interior, lines }
     }
 

@@ -7,7 +7,7 @@ use super::convex::{Obstacle, bar, swept};
 use super::frame::{Entry, JigFrame};
 use super::sizes::Sizes;
 use super::wall::{PressedGauge, Wall};
-use super::why::{LeftOut, Why};
+use super::why::{LeftOutGauge, Why};
 use crate::budget::{Cancelled, Watch, report};
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
@@ -24,13 +24,13 @@ pub struct Interior {
     /// Of the pieces.
     pub sizes: Sizes,
     /// Both ends of the part.
-    ends: Vec<End>,
+    ends: Vec<PartEnd>,
     /// Of the gauge nearest to the middle (mm).
     nearest: f64,
 }
 
 /// An end of the part.
-struct End {
+struct PartEnd {
     entry: Entry,
     /// Of a rod in the middle.
     frame: JigFrame,
@@ -41,7 +41,7 @@ struct End {
 
 /// A line that a rod may run on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
+pub struct RodLine {
     /// The number of the end.
     end: usize,
     /// Of the middle (mm).
@@ -52,11 +52,11 @@ pub struct Line {
 #[derive(Clone, Debug)]
 pub struct Rod {
     /// Where it runs.
-    pub line: Line,
+    pub line: RodLine,
     /// From the opening inwards.
     pub arms: Vec<Arm>,
     /// In the gauges' order.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<LeftOutGauge>,
 }
 
 impl Interior {
@@ -73,7 +73,7 @@ impl Interior {
             sizes: Sizes::within(nearest),
             ends: [Entry::Foot, Entry::Top]
                 .into_iter()
-                .filter_map(|entry| End::new(entry, &wall, middle))
+                .filter_map(|entry| PartEnd::new(entry, &wall, middle))
                 .collect(),
             wall,
             film,
@@ -83,7 +83,7 @@ impl Interior {
 
     /// Lines that are tried: the middle, and around it.
     #[must_use]
-    pub fn lines(&self) -> Vec<Line> {
+    pub fn lines(&self) -> Vec<RodLine> {
         /// Over the distance of the nearest gauge.
         const AROUND: [f64; 3] = [0.2, 0.4, 0.6];
         const WAYS: u32 = 8;
@@ -96,32 +96,36 @@ impl Interior {
         let ends = 0..self.ends.len();
         std::iter::once(DVec2::ZERO)
             .chain(around)
-            .flat_map(|beside| ends.clone().map(move |end| Line { end, beside }))
+            .flat_map(|beside| ends.clone().map(move |end| RodLine { end, beside }))
             .collect()
     }
 
     /// The frame of a rod there.
     #[must_use]
-    pub fn frame(&self, line: Line) -> JigFrame {
+    pub fn frame(&self, line: RodLine) -> JigFrame {
         self.ends[line.end].frame.beside(line.beside)
     }
 
     /// The end that it comes in at.
     #[must_use]
-    pub fn entry(&self, line: Line) -> Entry {
+    pub fn entry(&self, line: RodLine) -> Entry {
         self.ends[line.end].entry
     }
 
     /// The rim of its opening (mm).
     #[must_use]
-    pub fn rim(&self, line: Line) -> Vec<DVec2> {
+    pub fn rim(&self, line: RodLine) -> Vec<DVec2> {
         let rim = self.ends[line.end].rim.iter();
         rim.map(|p| *p - line.beside).collect()
     }
 
     /// A rod for these gauges.
     #[must_use]
-    pub fn rod<'g>(&self, line: Line, gauges: impl IntoIterator<Item = &'g PressedGauge>) -> Rod {
+    pub fn rod<'g>(
+        &self,
+        line: RodLine,
+        gauges: impl IntoIterator<Item = &'g PressedGauge>,
+    ) -> Rod {
         let mut rod = Rod {
             line,
             arms: Vec::new(),
@@ -131,7 +135,7 @@ impl Interior {
             let number = gauge.number;
             match self.arm(line, gauge) {
                 Ok(arm) => rod.arms.push(arm),
-                Err(why) => rod.left_out.push(LeftOut { number, why }),
+                Err(why) => rod.left_out.push(LeftOutGauge { number, why }),
             }
         }
         rod.arms
@@ -143,7 +147,7 @@ impl Interior {
     ///
     /// # Errors
     /// Why there is none on this line.
-    pub fn arm(&self, line: Line, gauge: &PressedGauge) -> Result<Arm, Why> {
+    pub fn arm(&self, line: RodLine, gauge: &PressedGauge) -> Result<Arm, Why> {
         /// Travels that are tried (mm).
         const STEP: f64 = 1.0;
         let sizes = &self.sizes;
@@ -169,7 +173,7 @@ impl Interior {
     ///
     /// # Errors
     /// What does not.
-    pub fn gets_in(&self, line: Line, arm: &Arm) -> Result<(), Why> {
+    pub fn gets_in(&self, line: RodLine, arm: &Arm) -> Result<(), Why> {
         let obstacle = &self.ends[line.end].obstacle;
         let head = bar(self.sizes.rod, -1.0, arm.ring(&self.sizes)[1] + HEAD);
         if obstacle.meets(&head, line.beside) {
@@ -188,7 +192,7 @@ impl Interior {
     }
 }
 
-impl End {
+impl PartEnd {
     fn new(entry: Entry, wall: &Wall, middle: DVec2) -> Option<Self> {
         /// What belongs to the rim (mm).
         const RIM: f64 = 2.0;

@@ -37,7 +37,7 @@ impl Why {
 
 /// A gauge that no arm reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LeftOut {
+pub struct LeftOutGauge {
     /// Its number.
     pub number: usize,
     /// What keeps an arm from it, on a rod in the middle.

@@ -2,8 +2,8 @@
 
 use super::doubt::ErrorModel;
 use super::family::Family;
-use super::inputs::Inputs;
-use super::machine::Machine;
+use super::inputs::ChannelScales;
+use super::machine::Regression;
 use super::targets::{Scale, TargetFrame};
 use crate::dataset::SignalMatrix;
 
@@ -11,11 +11,11 @@ use crate::dataset::SignalMatrix;
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchEstimator {
     /// How readings become features.
-    pub inputs: Inputs,
+    pub inputs: ChannelScales,
     /// How outputs become places.
     pub frame: TargetFrame,
     /// Places from features.
-    pub place: Machine,
+    pub place: Regression,
     /// How far places may be off.
     pub doubt: ErrorModel,
     /// Forces from features, where forces were known.
@@ -30,12 +30,12 @@ pub struct ForceEstimator {
     /// How the output becomes a force.
     pub scale: Scale,
     /// Forces from features.
-    pub machine: Machine,
+    pub machine: Regression,
 }
 
 /// What a reading says.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
+pub struct Estimate {
     /// Where it was touched (mm).
     pub place_mm: [f64; 3],
     /// The radius around it that nine of ten true places lie within (mm).
@@ -59,7 +59,7 @@ impl TouchEstimator {
 
     /// What readings (channels × touches, in the unit that was learned from) say, touch by touch.
     #[must_use]
-    pub fn find(&self, x: &SignalMatrix) -> Vec<Answer> {
+    pub fn find(&self, x: &SignalMatrix) -> Vec<Estimate> {
         let features = self.inputs.apply(x);
         let squared = self.place.squared_distances(&features);
         let places = self.frame.back(&self.place.answer(&squared));
@@ -69,7 +69,7 @@ impl TouchEstimator {
             force.scale.back(&force.machine.answer(&squared))
         });
         (places.into_iter().zip(radii).enumerate())
-            .map(|(t, (place_mm, radius))| Answer {
+            .map(|(t, (place_mm, radius))| Estimate {
                 place_mm,
                 radius_mm: radius * self.frame.size,
                 force_n: forces.as_ref().map(|f| f[t]),

@@ -4,7 +4,7 @@ use faer::Mat;
 use serde::{Deserialize, Serialize};
 
 use super::lessons::KnownTouches;
-use super::machine::Machine;
+use super::machine::Regression;
 use super::ridge::{self, Smoothness};
 use super::{gaussian_process, nearest, svr};
 use crate::budget::{Cancelled, Watch, report};
@@ -129,7 +129,7 @@ impl TunedMethod {
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for a stop.
-    pub fn fit(&self, known: &KnownTouches, watch: Watch) -> Result<Option<Machine>, Cancelled> {
+    pub fn fit(&self, known: &KnownTouches, watch: Watch) -> Result<Option<Regression>, Cancelled> {
         match self {
             Self::Svr(hyper) => svr::fit(known, hyper, watch).map(Some),
             Self::Nearest(count) => Ok(Some(nearest::fit(known, *count))),

@@ -17,7 +17,7 @@ const OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 
 /// What each channel is scaled by.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Inputs {
+pub struct ChannelScales {
     /// The median of each channel, in the unit of the readings.
     pub middle: Vec<f64>,
     /// The spread of each channel, in the same unit; zero for a channel that always reads the same.
@@ -26,7 +26,7 @@ pub struct Inputs {
     pub standard: Standardizer,
 }
 
-impl Inputs {
+impl ChannelScales {
     /// Of readings (channels × touches).
     #[must_use]
     pub fn of(x: &SignalMatrix) -> Self {
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn a_channel_that_is_stuck_says_nothing_and_one_that_mostly_rests_does() {
-        let inputs = Inputs::of(&readings());
+        let inputs = ChannelScales::of(&readings());
         assert_eq!(inputs.live(), [0, 2]);
         let features = inputs.apply(&readings());
         assert_eq!((features.nrows(), features.ncols()), (101, 2));
@@ -135,10 +135,10 @@ mod tests {
     #[test]
     fn the_unit_of_the_readings_changes_nothing() {
         let x = readings();
-        let plain = Inputs::of(&x).apply(&x);
+        let plain = ChannelScales::of(&x).apply(&x);
         for by in [1e-6, 1e6] {
             let scaled = x.scaled(by);
-            let same = Inputs::of(&scaled).apply(&scaled);
+            let same = ChannelScales::of(&scaled).apply(&scaled);
             assert!((&plain - &same).norm_max() < 1e-9);
         }
     }
@@ -148,7 +148,7 @@ mod tests {
         let mut values = readings().values().to_vec();
         values[5] = 1e9;
         let jumped = SignalMatrix::new(101, values);
-        let features = Inputs::of(&jumped).apply(&jumped);
+        let features = ChannelScales::of(&jumped).apply(&jumped);
         let others = (0..101).filter(|&t| t != 5).map(|t| features[(t, 0)]);
         let (low, high) = others.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
         assert!(high - low > 0.5, "{low} {high}");

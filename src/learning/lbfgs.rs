@@ -26,7 +26,7 @@ pub fn minimize(
     steps: usize,
     mut value: impl FnMut(&[f64]) -> Result<Valued, Cancelled>,
 ) -> Result<Vec<f64>, Cancelled> {
-    let Some(mut here) = Place::at(start.clone(), &mut value)? else {
+    let Some(mut here) = DescentPoint::at(start.clone(), &mut value)? else {
         return Ok(start);
     };
     let mut memory = Memory::default();
@@ -51,13 +51,13 @@ pub fn minimize(
     Ok(here.at)
 }
 
-struct Place {
+struct DescentPoint {
     at: Vec<f64>,
     value: f64,
     gradient: Vec<f64>,
 }
 
-impl Place {
+impl DescentPoint {
     fn at(
         at: Vec<f64>,
         value: &mut impl FnMut(&[f64]) -> Result<Valued, Cancelled>,
@@ -73,12 +73,12 @@ impl Place {
 
 /// The first of ever shorter steps that brings enough.
 fn descend(
-    here: &Place,
+    here: &DescentPoint,
     direction: &[f64],
     bounds: &[(f64, f64)],
     memory: &Memory,
     value: &mut impl FnMut(&[f64]) -> Result<Valued, Cancelled>,
-) -> Result<Option<Place>, Cancelled> {
+) -> Result<Option<DescentPoint>, Cancelled> {
     let longest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
     // Unknowns are logarithms: without a memory of the curvature no step is longer than one of them.
     let mut step = if memory.pairs.is_empty() {
@@ -95,7 +95,7 @@ fn descend(
         let promised: f64 = (at.iter().zip(&here.at).zip(&here.gradient))
             .map(|((new, old), g)| (new - old) * g)
             .sum();
-        let next = Place::at(at, value)?;
+        let next = DescentPoint::at(at, value)?;
         if let Some(next) = next.filter(|n| n.value <= here.value + ENOUGH * promised) {
             return Ok(Some(next));
         }
@@ -105,7 +105,7 @@ fn descend(
 }
 
 /// Unknowns at a bound that the direction leads beyond stay where they are.
-fn hold(direction: &mut [f64], here: &Place, bounds: &[(f64, f64)]) {
+fn hold(direction: &mut [f64], here: &DescentPoint, bounds: &[(f64, f64)]) {
     for ((d, x), (low, high)) in direction.iter_mut().zip(&here.at).zip(bounds) {
         if (x <= low && *d < 0.0) || (x >= high && *d > 0.0) {
             *d = 0.0;
@@ -121,7 +121,7 @@ struct Memory {
 }
 
 impl Memory {
-    fn learn(&mut self, from: &Place, to: &Place) {
+    fn learn(&mut self, from: &DescentPoint, to: &DescentPoint) {
         let less =
             |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
         let (step, change) = (less(&to.at, &from.at), less(&to.gradient, &from.gradient));

@@ -9,7 +9,7 @@ use crate::regression::folds::{Folds, evenly, number_of};
 
 /// Measured touches.
 #[derive(Clone, Copy, Debug)]
-pub struct Lessons<'a> {
+pub struct MeasuredTouches<'a> {
     /// Readings, channels × touches, in any unit.
     pub x: &'a SignalMatrix,
     /// Where each touch was (mm).

@@ -7,18 +7,18 @@ use super::kernel::Kernel;
 
 /// A regression with one or more outputs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Machine {
+pub struct Regression {
     /// What each feature is divided by before distances are taken.
     pub lengths: Vec<f64>,
     /// Known touches × features, over the lengths.
     pub points: Mat<f64>,
     /// How they answer.
-    pub by: By,
+    pub by: AnswerRule,
 }
 
 /// How known touches answer.
 #[derive(Clone, Debug, PartialEq)]
-pub enum By {
+pub enum AnswerRule {
     /// A sum of kernels.
     Kernel {
         /// Of the distance over the lengths.
@@ -37,7 +37,7 @@ pub enum By {
     },
 }
 
-impl Machine {
+impl Regression {
     /// Squared distances, over the lengths, of touches (× features) to the known ones: touches × known.
     #[must_use]
     pub fn squared_distances(&self, features: &Mat<f64>) -> Mat<f64> {
@@ -48,7 +48,7 @@ impl Machine {
     #[must_use]
     pub fn answer(&self, squared: &Mat<f64>) -> Mat<f64> {
         match &self.by {
-            By::Kernel {
+            AnswerRule::Kernel {
                 kernel,
                 weights,
                 bias,
@@ -56,7 +56,7 @@ impl Machine {
                 let sums = kernel.of(squared.clone()) * weights;
                 Mat::from_fn(sums.nrows(), sums.ncols(), |t, k| sums[(t, k)] + bias[k])
             }
-            By::Nearest { outputs, count } => {
+            AnswerRule::Nearest { outputs, count } => {
                 let mut answers = Mat::zeros(squared.nrows(), outputs.ncols());
                 for t in 0..squared.nrows() {
                     let near = nearest((0..).zip(squared.row(t).iter().copied()), *count);
@@ -91,10 +91,10 @@ mod tests {
 
     #[test]
     fn the_nearest_answer_by_how_near_they_are() {
-        let machine = Machine {
+        let machine = Regression {
             lengths: vec![2.0],
             points: Mat::from_fn(4, 1, |i, _| i as f64),
-            by: By::Nearest {
+            by: AnswerRule::Nearest {
                 outputs: Mat::from_fn(4, 1, |i, _| 10.0 * i as f64),
                 count: 2,
             },

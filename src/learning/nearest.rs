@@ -4,7 +4,7 @@ use faer::Mat;
 
 use super::distance::{among, nearest};
 use super::lessons::{KnownTouches, lengths};
-use super::machine::{By, Machine, mean_of};
+use super::machine::{AnswerRule, Regression, mean_of};
 use crate::statistics::mean;
 
 /// Touches that the number of neighbours is chosen on.
@@ -27,11 +27,11 @@ pub fn search(known: &KnownTouches) -> usize {
 
 /// The regression on all touches, of so many neighbours.
 #[must_use]
-pub fn fit(known: &KnownTouches, count: usize) -> Machine {
-    Machine {
+pub fn fit(known: &KnownTouches, count: usize) -> Regression {
+    Regression {
         lengths: vec![1.0; known.features.ncols()],
         points: known.features.clone(),
-        by: By::Nearest {
+        by: AnswerRule::Nearest {
             outputs: known.outputs.clone(),
             count,
         },

@@ -7,8 +7,8 @@
 use faer::Mat;
 
 use super::doubt::NEAR;
-use super::machine::{By, Machine};
-use super::{Answer, TouchEstimator};
+use super::machine::{AnswerRule, Regression};
+use super::{Estimate, TouchEstimator};
 
 /// How numbers are kept on a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,12 +38,12 @@ impl Precision {
 }
 
 /// The touches that are nearest to a reading, nearest first, as squared distance and number.
-struct Near {
+struct NearestTouches {
     most: usize,
     found: Vec<(f64, usize)>,
 }
 
-impl Near {
+impl NearestTouches {
     fn take(&mut self, squared: f64, number: usize) {
         let full = self.found.len() == self.most;
         if full && self.found.last().is_none_or(|worst| squared >= worst.0) {
@@ -59,17 +59,17 @@ impl Near {
 
 /// How many near touches have to be kept: for the radius, and for a mean of them.
 #[must_use]
-pub fn kept(machine: &Machine) -> usize {
+pub fn kept(machine: &Regression) -> usize {
     match machine.by {
-        By::Kernel { .. } => NEAR,
-        By::Nearest { count, .. } => count.max(NEAR),
+        AnswerRule::Kernel { .. } => NEAR,
+        AnswerRule::Nearest { count, .. } => count.max(NEAR),
     }
     .min(machine.points.nrows())
 }
 
 /// What a board makes of a reading (a number a channel).
 #[must_use]
-pub fn answer(estimator: &TouchEstimator, reading: &[f64], precision: Precision) -> Answer {
+pub fn answer(estimator: &TouchEstimator, reading: &[f64], precision: Precision) -> Estimate {
     let r = |x: f64| precision.round(x);
     let features = features(estimator, reading, precision);
     let (outputs, near) = run(&estimator.place, &features, precision);
@@ -87,7 +87,7 @@ pub fn answer(estimator: &TouchEstimator, reading: &[f64], precision: Precision)
     let first = near.first().map_or(0.0, |n| r(n.0.sqrt()));
     let strange = r(first / r(doubt.usual.max(f64::from(f32::MIN_POSITIVE)))).max(1.0);
     let expected = r(r(r(off / near.len().clamp(1, NEAR) as f64).sqrt()) * strange);
-    Answer {
+    Estimate {
         place_mm,
         radius_mm: r(expected * r(doubt.factor * frame.size)),
         force_n: estimator.force.as_ref().map(|force| {
@@ -109,19 +109,23 @@ fn features(estimator: &TouchEstimator, reading: &[f64], precision: Precision) -
 }
 
 /// The outputs of a machine and the touches near by.
-fn run(machine: &Machine, features: &[f64], precision: Precision) -> (Vec<f64>, Vec<(f64, usize)>) {
+fn run(
+    machine: &Regression,
+    features: &[f64],
+    precision: Precision,
+) -> (Vec<f64>, Vec<(f64, usize)>) {
     let r = |x: f64| precision.round(x);
     let asked: Vec<f64> = (features.iter().zip(&machine.lengths))
         .map(|(f, length)| r(f / r(*length)))
         .collect();
     let most = kept(machine);
-    let mut near = Near {
+    let mut near = NearestTouches {
         most,
         found: Vec::with_capacity(most),
     };
     let mut outputs = match &machine.by {
-        By::Kernel { bias, .. } => bias.iter().map(|b| r(*b)).collect(),
-        By::Nearest { outputs, .. } => vec![0.0; outputs.ncols()],
+        AnswerRule::Kernel { bias, .. } => bias.iter().map(|b| r(*b)).collect(),
+        AnswerRule::Nearest { outputs, .. } => vec![0.0; outputs.ncols()],
     };
     for i in 0..machine.points.nrows() {
         let squared = asked.iter().enumerate().fold(0.0, |sum, (j, q)| {
@@ -129,7 +133,7 @@ fn run(machine: &Machine, features: &[f64], precision: Precision) -> (Vec<f64>, 
             r(sum + r(apart * apart))
         });
         near.take(squared, i);
-        if let By::Kernel {
+        if let AnswerRule::Kernel {
             kernel, weights, ..
         } = &machine.by
         {
@@ -139,7 +143,7 @@ fn run(machine: &Machine, features: &[f64], precision: Precision) -> (Vec<f64>, 
             }
         }
     }
-    if let By::Nearest {
+    if let AnswerRule::Nearest {
         outputs: known,
         count,
     } = &machine.by

@@ -9,7 +9,7 @@ use super::distance::{among, median, over};
 use super::kernel::Kernel;
 use super::left_out;
 use super::lessons::{KnownTouches, lengths as norms};
-use super::machine::{By, Machine};
+use super::machine::{AnswerRule, Regression};
 use super::walk::walk;
 use crate::statistics::mean;
 
@@ -63,14 +63,14 @@ pub fn search(known: &KnownTouches) -> Smoothness {
 impl Smoothness {
     /// The regression on all touches; nothing where their covariance has no factor.
     #[must_use]
-    pub fn fit(&self, known: &KnownTouches) -> Option<Machine> {
+    pub fn fit(&self, known: &KnownTouches) -> Option<Regression> {
         let points = over(&known.features, &self.lengths);
         let covariance = noisy(self.kernel.of(among(&points)), self.noise);
         let weights = covariance.llt(Side::Lower).ok()?.solve(&known.outputs);
-        Some(Machine {
+        Some(Regression {
             lengths: self.lengths.clone(),
             points,
-            by: By::Kernel {
+            by: AnswerRule::Kernel {
                 kernel: self.kernel,
                 bias: vec![0.0; weights.ncols()],
                 weights,

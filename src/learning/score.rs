@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::estimator::Answer;
+use super::estimator::Estimate;
 use crate::regression::tune::distances;
 use crate::statistics::{mean, quantile};
 
@@ -44,7 +44,7 @@ const EDGES_N: [f64; 6] = [0.0, 0.5, 4.9, 9.8, 19.6, 34.3];
 impl Scores {
     /// Of answers, at least one, to touches at true places (mm) of known forces (N), which may be left out.
     #[must_use]
-    pub fn of(answers: &[Answer], places_mm: &[[f64; 3]], forces: &[f64]) -> Self {
+    pub fn of(answers: &[Estimate], places_mm: &[[f64; 3]], forces: &[f64]) -> Self {
         let said: Vec<[f64; 3]> = answers.iter().map(|a| a.place_mm).collect();
         let errors = distances(&said, places_mm);
         let within = answers
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn errors_are_told_by_force_and_radii_are_counted() {
-        let answer = |x: f64, radius_mm: f64, force: f64| Answer {
+        let answer = |x: f64, radius_mm: f64, force: f64| Estimate {
             place_mm: [x, 0.0, 0.0],
             radius_mm,
             force_n: Some(force),

@@ -1,7 +1,7 @@
 //! Whether a skin still is what an estimator was trained on, from a few presses.
 
 use super::doubt::NORMAL_MEAN;
-use super::estimator::Answer;
+use super::estimator::Estimate;
 use crate::regression::tune::distances;
 use crate::statistics::mean;
 
@@ -26,7 +26,7 @@ impl Still {
     /// touches that were left out when the estimator learned, by their ranks (H. B. Mann and D. R. Whitney 1947): no
     /// distribution is assumed. Nothing where fewer than five of either are there.
     #[must_use]
-    pub fn of(known: &[f64], answers: &[Answer], places_mm: &[[f64; 3]]) -> Option<Self> {
+    pub fn of(known: &[f64], answers: &[Estimate], places_mm: &[[f64; 3]]) -> Option<Self> {
         const LEAST: usize = 5;
         if answers.len().min(known.len()) < LEAST {
             return None;
@@ -70,10 +70,10 @@ impl Still {
 
 /// How far answers are from the true places (mm), over the radius of each.
 #[must_use]
-pub fn over_radius(answers: &[Answer], places_mm: &[[f64; 3]]) -> Vec<f64> {
+pub fn over_radius(answers: &[Estimate], places_mm: &[[f64; 3]]) -> Vec<f64> {
     let said: Vec<[f64; 3]> = answers.iter().map(|a| a.place_mm).collect();
     let errors = distances(&said, places_mm);
-    let over = |(e, a): (&f64, &Answer)| e / a.radius_mm.max(f64::MIN_POSITIVE);
+    let over = |(e, a): (&f64, &Estimate)| e / a.radius_mm.max(f64::MIN_POSITIVE);
     errors.iter().zip(answers).map(over).collect()
 }
 

@@ -5,14 +5,14 @@ use faer::Mat;
 use super::distance::among;
 use super::kernel::Kernel;
 use super::lessons::{KnownTouches, lengths as norms};
-use super::machine::{By, Machine};
+use super::machine::{AnswerRule, Regression};
 use super::walk::walk;
 use crate::budget::{Cancelled, Watch, report};
 use crate::regression::folds::Folds;
 use crate::regression::kernel::gaussian;
 use crate::regression::scale::USUAL_SPREAD_MM;
 use crate::regression::svr::{Problem, solve};
-use crate::regression::{Fit, Hyper, SvrParams};
+use crate::regression::{Hyper, SvrFit, SvrParams};
 use crate::statistics::mean;
 
 /// Touches that settings are searched on.
@@ -48,7 +48,7 @@ pub fn search(known: &KnownTouches, stage: &'static str, watch: Watch) -> Result
     let usual = Hyper::default().scaled(USUAL_SPREAD_MM.recip());
     let gamma = usual.gamma * 10.0 / known.features.ncols().max(1) as f64;
     let usual = Hyper { gamma, ..usual };
-    let bench = Bench::new(&some);
+    let bench = SvrFolds::new(&some);
     let mut best = (paper(), bench.error(&paper(), watch)?);
     let mut tried = 0;
     let at = |steps: [i32; 3]| Hyper {
@@ -68,13 +68,13 @@ pub fn search(known: &KnownTouches, stage: &'static str, watch: Watch) -> Result
 }
 
 /// What all trials of a search share; touches in the order of their folds.
-struct Bench {
+struct SvrFolds {
     squared: Vec<f64>,
     outputs: Vec<Vec<f64>>,
     folds: Folds,
 }
 
-impl Bench {
+impl SvrFolds {
     fn new(known: &KnownTouches) -> Self {
         let folds = Folds::of_groups(&dense(&known.groups), FOLDS, 0);
         let ordered = known.some(&folds.order);
@@ -126,9 +126,9 @@ const STAGE: &str = "Support vectors";
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
-pub fn fit(known: &KnownTouches, hyper: &Hyper, watch: Watch) -> Result<Machine, Cancelled> {
+pub fn fit(known: &KnownTouches, hyper: &Hyper, watch: Watch) -> Result<Regression, Cancelled> {
     let kernel = gaussian(&flat(&among(&known.features)), hyper.gamma);
-    let mut fits: Vec<Fit> = Vec::with_capacity(known.outputs.ncols());
+    let mut fits: Vec<SvrFit> = Vec::with_capacity(known.outputs.ncols());
     for column in known.outputs.col_iter() {
         let y: Vec<f64> = column.iter().copied().collect();
         let problem = Problem {
@@ -142,10 +142,10 @@ pub fn fit(known: &KnownTouches, hyper: &Hyper, watch: Watch) -> Result<Machine,
     // exp(-γ d²) as exp(-(d/l)²/2).
     let length = (2.0 * hyper.gamma).sqrt().recip();
     let lengths = vec![length; known.features.ncols()];
-    Ok(Machine {
+    Ok(Regression {
         points: super::distance::over(&known.features, &lengths),
         lengths,
-        by: By::Kernel {
+        by: AnswerRule::Kernel {
             kernel: Kernel::Gaussian,
             weights: Mat::from_fn(known.features.nrows(), fits.len(), |t, k| fits[k].beta[t]),
             bias: fits.iter().map(|f| f.bias).collect(),
@@ -158,7 +158,7 @@ pub fn fit(known: &KnownTouches, hyper: &Hyper, watch: Watch) -> Result<Machine,
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
 pub fn left_out(known: &KnownTouches, hyper: &Hyper, watch: Watch) -> Result<Mat<f64>, Cancelled> {
-    let bench = Bench::new(known);
+    let bench = SvrFolds::new(known);
     let ordered = bench.residuals(hyper, LONG, watch)?;
     let mut left = Mat::zeros(ordered.nrows(), ordered.ncols());
     for (place, &touch) in bench.folds.order.iter().enumerate() {
@@ -215,7 +215,7 @@ mod tests {
     fn a_search_is_no_worse_than_the_paper_and_left_out_is_what_it_says() {
         let known = known(3.0);
         let found = search(&known, "Learning", &unwatched).unwrap();
-        let bench = Bench::new(&known.thinned(SEARCHED));
+        let bench = SvrFolds::new(&known.thinned(SEARCHED));
         let error = |hyper: &Hyper| bench.error(hyper, &unwatched).unwrap();
         assert!(error(&found) <= error(&paper()));
         let left = left_out(&known, &found, &unwatched).unwrap();

@@ -8,9 +8,9 @@ use super::distance::among;
 use super::doubt::ErrorModel;
 use super::estimator::{ForceEstimator, TouchEstimator};
 use super::family::{Family, Method, TunedMethod};
-use super::inputs::Inputs;
-use super::lessons::{Division, KnownTouches, LearningError, Lessons, lengths};
-use super::machine::Machine;
+use super::inputs::ChannelScales;
+use super::lessons::{Division, KnownTouches, LearningError, MeasuredTouches, lengths};
+use super::machine::Regression;
 use super::score::Scores;
 use super::targets::{Scale, TargetFrame};
 use crate::budget::Watch;
@@ -30,13 +30,13 @@ pub struct TrainingRequest {
 
 /// What came of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trained {
+pub struct TrainedEstimator {
     /// The estimator that was chosen.
     pub estimator: TouchEstimator,
     /// Its family.
     pub family: Family,
     /// Every family's error on the validation touches.
-    pub tried: Vec<Trial>,
+    pub tried: Vec<MethodTrial>,
     /// On the test touches.
     pub scores: Scores,
     /// Mean error on the validation touches (mm).
@@ -49,7 +49,7 @@ pub struct Trained {
 
 /// How a method did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Trial {
+pub struct MethodTrial {
     /// The method.
     pub estimator: Method,
     /// Mean error on the validation touches (mm).
@@ -65,10 +65,10 @@ const MOST: usize = 6000;
 /// # Errors
 /// [`LearningError`] for touches that nothing can be learned from, or when the watch asks for a stop.
 pub fn train(
-    lessons: &Lessons,
+    lessons: &MeasuredTouches,
     asked: &TrainingRequest,
     watch: Watch,
-) -> Result<Trained, LearningError> {
+) -> Result<TrainedEstimator, LearningError> {
     let mut division = Division::draw(lessons.groups, asked.seed, asked.train_touches)?;
     let mut notes = Vec::new();
     if division.train.len() > MOST {
@@ -82,7 +82,7 @@ pub fn train(
     notes.extend(school.note());
     let frame = TargetFrame::of(&school.places(&division.train)).ok_or(LearningError::OnePlace)?;
     let outputs = |touches: &[usize]| frame.apply(&school.places(touches));
-    let lesson = Lesson {
+    let lesson = SplitLesson {
         known: school.known(&division.train, outputs(&division.train)),
         others: school.known(&division.validation, outputs(&division.validation)),
     };
@@ -103,11 +103,11 @@ pub fn train(
         .collect();
     let answers = estimator.find(&lessons.x.select_columns(&division.test));
     let size = estimator.frame.size;
-    Ok(Trained {
+    Ok(TrainedEstimator {
         family: chosen.family,
         tried: tried
             .iter()
-            .map(|t| Trial {
+            .map(|t| MethodTrial {
                 estimator: t.0.into(),
                 validation_mm: t.1 * size,
             })
@@ -122,16 +122,16 @@ pub fn train(
 
 /// Touches as features.
 struct School<'a> {
-    lessons: &'a Lessons<'a>,
-    inputs: Inputs,
+    lessons: &'a MeasuredTouches<'a>,
+    inputs: ChannelScales,
     /// Touches × live channels.
     features: Mat<f64>,
 }
 
 impl<'a> School<'a> {
     /// Scaled as the training touches say.
-    fn new(lessons: &'a Lessons<'a>, division: &Division) -> Result<Self, LearningError> {
-        let inputs = Inputs::of(&lessons.x.select_columns(&division.train));
+    fn new(lessons: &'a MeasuredTouches<'a>, division: &Division) -> Result<Self, LearningError> {
+        let inputs = ChannelScales::of(&lessons.x.select_columns(&division.train));
         if inputs.live().is_empty() {
             return Err(LearningError::NoSignal);
         }
@@ -185,7 +185,7 @@ impl<'a> School<'a> {
             return Ok(None);
         };
         let known = |touches: &[usize]| self.known(touches, scale.apply(&of(touches)));
-        let lesson = Lesson {
+        let lesson = SplitLesson {
             known: known(&division.train),
             others: known(&division.validation),
         };
@@ -199,32 +199,32 @@ impl<'a> School<'a> {
 }
 
 /// What is learned from and what is chosen by.
-struct Lesson {
+struct SplitLesson {
     known: KnownTouches,
     others: KnownTouches,
 }
 
 /// A family with what it made of a lesson.
-struct Chosen {
+struct ChosenMethod {
     family: Family,
     settings: TunedMethod,
-    machine: Machine,
+    machine: Regression,
     /// Mean error on the others, in the unit of the outputs.
     error: f64,
 }
 
-impl Lesson {
+impl SplitLesson {
     /// The family that does best on the others, and how each did.
     fn choose(
         &self,
         families: &[Family],
         watch: Watch,
-    ) -> Result<(Chosen, Vec<(Family, f64)>), LearningError> {
-        let learned: Result<Vec<Option<Chosen>>, LearningError> = families
+    ) -> Result<(ChosenMethod, Vec<(Family, f64)>), LearningError> {
+        let learned: Result<Vec<Option<ChosenMethod>>, LearningError> = families
             .par_iter()
             .map(|&family| self.learn(family, watch))
             .collect();
-        let learned: Vec<Chosen> = learned?.into_iter().flatten().collect();
+        let learned: Vec<ChosenMethod> = learned?.into_iter().flatten().collect();
         let tried = learned.iter().map(|c| (c.family, c.error)).collect();
         let best = learned
             .into_iter()
@@ -233,13 +233,13 @@ impl Lesson {
             .ok_or(LearningError::Singular)
     }
 
-    fn learn(&self, family: Family, watch: Watch) -> Result<Option<Chosen>, LearningError> {
+    fn learn(&self, family: Family, watch: Watch) -> Result<Option<ChosenMethod>, LearningError> {
         let settings = family.search(&self.known, watch)?;
         let Some(machine) = settings.fit(&self.known, watch)? else {
             return Ok(None);
         };
         let error = mean(&self.errors(&machine));
-        Ok(error.is_finite().then_some(Chosen {
+        Ok(error.is_finite().then_some(ChosenMethod {
             family,
             settings,
             machine,
@@ -248,13 +248,17 @@ impl Lesson {
     }
 
     /// How far off a machine is at each of the others.
-    fn errors(&self, machine: &Machine) -> Vec<f64> {
+    fn errors(&self, machine: &Regression) -> Vec<f64> {
         let squared = machine.squared_distances(&self.others.features);
         lengths(&(machine.answer(&squared) - &self.others.outputs))
     }
 
     /// How far a chosen machine may be off.
-    fn error_model(&self, chosen: &Chosen, watch: Watch) -> Result<ErrorModel, LearningError> {
+    fn error_model(
+        &self,
+        chosen: &ChosenMethod,
+        watch: Watch,
+    ) -> Result<ErrorModel, LearningError> {
         let left = chosen.settings.left_out(&self.known, watch)?;
         let left = left.ok_or(LearningError::Singular)?;
         let machine = &chosen.machine;

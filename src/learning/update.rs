@@ -12,8 +12,8 @@ use faer::Mat;
 use faer::prelude::Solve;
 
 use super::doubt::NORMAL_MEAN;
-use super::estimator::{Answer, TouchEstimator};
-use super::lessons::{LearningError, Lessons, columns};
+use super::estimator::{Estimate, TouchEstimator};
+use super::lessons::{LearningError, MeasuredTouches, columns};
 use super::score::Scores;
 use crate::budget::{Watch, report};
 use crate::regression::folds::{Folds, number_of};
@@ -50,7 +50,7 @@ const PARTS: usize = 5;
 /// [`LearningError`] for too few places, or when the watch asks for a stop.
 pub fn update(
     old: &TouchEstimator,
-    lessons: &Lessons,
+    lessons: &MeasuredTouches,
     seed: u64,
     watch: Watch,
 ) -> Result<Updated, LearningError> {
@@ -62,7 +62,7 @@ pub fn update(
         });
     }
     let folds = Folds::of_groups(lessons.groups, PARTS.min(places), seed);
-    let fit = Fit { old, lessons };
+    let fit = UpdateFit { old, lessons };
     let all: Vec<usize> = (0..lessons.places_mm.len()).collect();
     let before = old.find(lessons.x);
     let mut best = (
@@ -92,7 +92,7 @@ pub fn update(
     let change = prior.map_or_else(|| fit.nothing(), |width| fit.solve(&all, width));
     let mut estimator = fit.with(&change);
     estimator.doubt.factor *= wider(&answers, lessons.places_mm);
-    let scores = |answers: &[Answer]| Scores::of(answers, lessons.places_mm, lessons.forces);
+    let scores = |answers: &[Estimate]| Scores::of(answers, lessons.places_mm, lessons.forces);
     let spread = &old.inputs.spread;
     let mut gains = vec![1.0; old.channels()];
     let mut rests = vec![0.0; old.channels()];
@@ -110,7 +110,7 @@ pub fn update(
     })
 }
 
-fn errors(answers: &[Answer], places_mm: &[[f64; 3]]) -> Vec<f64> {
+fn errors(answers: &[Estimate], places_mm: &[[f64; 3]]) -> Vec<f64> {
     answers
         .iter()
         .zip(places_mm)
@@ -118,14 +118,14 @@ fn errors(answers: &[Answer], places_mm: &[[f64; 3]]) -> Vec<f64> {
         .collect()
 }
 
-fn off(answer: &Answer, place: &[f64; 3]) -> f64 {
+fn off(answer: &Estimate, place: &[f64; 3]) -> f64 {
     let squares = (0..3).map(|k| (answer.place_mm[k] - place[k]).powi(2));
     squares.sum::<f64>().sqrt()
 }
 
 /// By how much radii must be wider than they were thought to be, from answers to presses that were left out; as many presses
 /// that are as expected stand beside them.
-fn wider(answers: &[Answer], places_mm: &[[f64; 3]]) -> f64 {
+fn wider(answers: &[Estimate], places_mm: &[[f64; 3]]) -> f64 {
     const BEFOREHAND: f64 = 5.0;
     let over = answers.iter().zip(places_mm).map(|(a, p)| {
         let expected = NORMAL_MEAN * a.radius_mm;
@@ -137,29 +137,29 @@ fn wider(answers: &[Answer], places_mm: &[[f64; 3]]) -> f64 {
 
 /// What is fitted, a live channel each.
 #[derive(Clone, Debug)]
-struct Change {
+struct ChannelUpdate {
     /// Logarithms of the gains.
     gains: Vec<f64>,
     /// Over the channel's spread.
     rests: Vec<f64>,
 }
 
-struct Fit<'a> {
+struct UpdateFit<'a> {
     old: &'a TouchEstimator,
-    lessons: &'a Lessons<'a>,
+    lessons: &'a MeasuredTouches<'a>,
 }
 
-impl Fit<'_> {
-    fn nothing(&self) -> Change {
+impl UpdateFit<'_> {
+    fn nothing(&self) -> ChannelUpdate {
         let live = self.old.inputs.live().len();
-        Change {
+        ChannelUpdate {
             gains: vec![0.0; live],
             rests: vec![0.0; live],
         }
     }
 
     /// The old estimator with its channels changed.
-    fn with(&self, change: &Change) -> TouchEstimator {
+    fn with(&self, change: &ChannelUpdate) -> TouchEstimator {
         let mut changed = self.old.clone();
         let inputs = &mut changed.inputs;
         for (k, c) in self.old.inputs.live().into_iter().enumerate() {
@@ -172,14 +172,14 @@ impl Fit<'_> {
     }
 
     /// Least squares over some of the presses, with a prior of a width.
-    fn solve(&self, presses: &[usize], width: f64) -> Change {
+    fn solve(&self, presses: &[usize], width: f64) -> ChannelUpdate {
         const STEPS: usize = 12;
         let mut damping = 1e-2;
         let mut change = self.nothing();
         let mut cost = self.cost(&change, presses, width);
         for _ in 0..STEPS {
             let step = self.step(&change, presses, width, damping);
-            let tried = Change {
+            let tried = ChannelUpdate {
                 gains: added(&change.gains, &step[..change.gains.len()]),
                 rests: added(&change.rests, &step[change.gains.len()..]),
             };
@@ -198,7 +198,7 @@ impl Fit<'_> {
         change
     }
 
-    fn cost(&self, change: &Change, presses: &[usize], width: f64) -> f64 {
+    fn cost(&self, change: &ChannelUpdate, presses: &[usize], width: f64) -> f64 {
         let (residuals, _) = self.residuals(&self.with(change), presses);
         let own = change.gains.iter().chain(&change.rests);
         let own: f64 = own.map(|v| (v / width).powi(2)).sum();
@@ -239,7 +239,13 @@ impl Fit<'_> {
 
     /// A damped step of gains and rests. A change of a channel moves its own feature alone, so that slopes over features are
     /// enough.
-    fn step(&self, change: &Change, presses: &[usize], width: f64, damping: f64) -> Vec<f64> {
+    fn step(
+        &self,
+        change: &ChannelUpdate,
+        presses: &[usize],
+        width: f64,
+        damping: f64,
+    ) -> Vec<f64> {
         let changed = self.with(change);
         let (residuals, features) = self.residuals(&changed, presses);
         let live = changed.inputs.live();
@@ -351,8 +357,8 @@ mod tests {
         x: &'a SignalMatrix,
         places_mm: &'a [[f64; 3]],
         groups: &'a [usize],
-    ) -> Lessons<'a> {
-        Lessons {
+    ) -> MeasuredTouches<'a> {
+        MeasuredTouches {
             x,
             places_mm,
             forces: &[],

@@ -12,9 +12,9 @@ use glam::{DVec2, DVec3};
 
 pub use super::barrel_spec::{BarrelSpec, FrameSpec};
 
-use super::body::Body;
+use super::body::LimbBody;
 use super::frame;
-use super::lattice::{End, Foot, Lattice, incircle};
+use super::lattice::{Foot, LimbLattice, Rim, incircle};
 use super::{BoxMm, LimbError, range};
 use crate::mesh::TriMesh;
 
@@ -25,9 +25,9 @@ impl BarrelSpec {
     /// [`LimbError`] where the parameters do not describe a limb.
     pub fn build(&self) -> Result<(TriMesh, Vec<BoxMm>), LimbError> {
         self.check()?;
-        let lattice = Lattice::new(self);
+        let lattice = LimbLattice::new(self);
         let feet: Vec<[Foot; 2]> = frame::columns(self, &lattice)
-            .map(|column| [End::Low, End::High].map(|end| lattice.foot(column, end)))
+            .map(|column| [Rim::Low, Rim::High].map(|end| lattice.foot(column, end)))
             .collect();
         let open: BTreeSet<usize> = feet.iter().flatten().flat_map(|foot| foot.cells).collect();
         let mut body = self.shell(&lattice, &open);
@@ -49,8 +49,8 @@ impl BarrelSpec {
     }
 
     /// Both faces of the wall, the inner one open where rods grow out of it, and what joins them along all edges.
-    fn shell(&self, lattice: &Lattice, open: &BTreeSet<usize>) -> Body {
-        let mut body = Body::default();
+    fn shell(&self, lattice: &LimbLattice, open: &BTreeSet<usize>) -> LimbBody {
+        let mut body = LimbBody::default();
         for outwards in [self.wall / 2.0, -self.wall / 2.0] {
             (body.points).extend(lattice.points.iter().map(|&p| self.bend(p, outwards)));
         }

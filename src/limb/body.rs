@@ -25,12 +25,12 @@ pub(super) const AROUND: [(isize, isize); CORNERS] = [
 
 /// Points (mm) and triangles that face outward.
 #[derive(Default)]
-pub(super) struct Body {
+pub(super) struct LimbBody {
     pub points: Vec<DVec3>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-impl Body {
+impl LimbBody {
     /// Adds a point (mm); its number.
     pub fn add(&mut self, point: DVec3) -> u32 {
         self.points.push(point);

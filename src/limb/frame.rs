@@ -6,14 +6,14 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::DVec3;
 
 use super::barrel_spec::BarrelSpec;
-use super::body::{AROUND, Body, CORNERS, Ring};
-use super::lattice::{Foot, Lattice, steps};
+use super::body::{AROUND, CORNERS, LimbBody, Ring};
+use super::lattice::{Foot, LimbLattice, steps};
 
 /// The corners of a rod's section that look at the next rod and at the one before, exactly so of four.
 const TOWARDS: [usize; 2] = [4, 6];
 
 /// A rod from foot to foot.
-struct Rod {
+struct FrameRod {
     rings: Vec<Ring>,
     /// Sides that braces grow out of.
     open: BTreeSet<(usize, usize)>,
@@ -23,15 +23,20 @@ struct Rod {
 }
 
 /// The steps around that rods stand at, as evenly as there are steps.
-pub(super) fn columns(spec: &BarrelSpec, lattice: &Lattice) -> impl Iterator<Item = isize> {
+pub(super) fn columns(spec: &BarrelSpec, lattice: &LimbLattice) -> impl Iterator<Item = isize> {
     let (rods, all) = (spec.frame.rods as isize, lattice.columns);
     (0..rods).map(move |k| (2 * k * all + rods) / (2 * rods))
 }
 
 /// Grows the frame out of the feet that were left open on the inner face, the lower and the upper one of each rod.
-pub(super) fn grow(spec: &BarrelSpec, lattice: &Lattice, feet: &[[Foot; 2]], body: &mut Body) {
+pub(super) fn grow(
+    spec: &BarrelSpec,
+    lattice: &LimbLattice,
+    feet: &[[Foot; 2]],
+    body: &mut LimbBody,
+) {
     let inner = lattice.points.len();
-    let mut rods: Vec<Rod> = columns(spec, lattice)
+    let mut rods: Vec<FrameRod> = columns(spec, lattice)
         .zip(feet)
         .map(|(column, ends)| {
             let ends = [0, 1].map(|end| ends[end].around.map(|point| (inner + point) as u32));
@@ -54,7 +59,7 @@ pub(super) fn grow(spec: &BarrelSpec, lattice: &Lattice, feet: &[[Foot; 2]], bod
 }
 
 /// A rod in the plane of the axis and an angle: inwards from the lower foot, up, and outwards to the upper one.
-fn rod(spec: &BarrelSpec, angle: f64, [from, to]: [Ring; 2], body: &mut Body) -> Rod {
+fn rod(spec: &BarrelSpec, angle: f64, [from, to]: [Ring; 2], body: &mut LimbBody) -> FrameRod {
     let (sin, cos) = angle.sin_cos();
     let outwards = DVec3::new(sin, 0.0, cos);
     let across = DVec3::new(cos, 0.0, -sin);
@@ -67,7 +72,7 @@ fn rod(spec: &BarrelSpec, angle: f64, [from, to]: [Ring; 2], body: &mut Body) ->
         body.ring(centre, [across, along.cross(across)], spec.frame.rod_radius)
     }));
     rings.push(to);
-    Rod {
+    FrameRod {
         rings,
         open: BTreeSet::new(),
         upright: path.upright,
@@ -76,7 +81,7 @@ fn rod(spec: &BarrelSpec, angle: f64, [from, to]: [Ring; 2], body: &mut Body) ->
 }
 
 /// A place of a rod's middle: distance from the axis, height, and the angle of its direction from outwards to up.
-struct Section {
+struct RodSection {
     radius: f64,
     y: f64,
     climb: f64,
@@ -84,7 +89,7 @@ struct Section {
 
 /// The middle of a rod between its feet.
 struct Path {
-    sections: Vec<Section>,
+    sections: Vec<RodSection>,
     upright: usize,
     length: usize,
 }
@@ -102,7 +107,7 @@ impl Path {
         // Room for the knots of all braces.
         let length = steps(tall, 2.0 * frame.brace_radius).max(3 * (frame.braces + 1));
         let mut sections = Vec::new();
-        let mut add = |radius, y, climb| sections.push(Section { radius, y, climb });
+        let mut add = |radius, y, climb| sections.push(RodSection { radius, y, climb });
         let share = |i: usize, of: usize| i as f64 / of as f64;
         for i in 1..=straight {
             add(turned + inwards * (1.0 - share(i, straight)), low, PI);
@@ -142,7 +147,7 @@ impl Path {
 
 /// Opens two by two sides of a rod about a corner of a section, and names the points around them as the brace's
 /// sections count theirs: with the rod's corners (`way` 1) where it begins, against them (-1) where it arrives.
-fn knot(rod: &mut Rod, station: usize, corner: usize, way: isize) -> Ring {
+fn knot(rod: &mut FrameRod, station: usize, corner: usize, way: isize) -> Ring {
     for (i, j) in [(corner - 1, 1), (corner, 1), (corner - 1, 0), (corner, 0)] {
         rod.open.insert((station - j, i));
     }
@@ -153,7 +158,7 @@ fn knot(rod: &mut Rod, station: usize, corner: usize, way: isize) -> Ring {
 }
 
 /// A straight brace between two knots.
-fn add_brace(spec: &BarrelSpec, here: Ring, there: Ring, body: &mut Body) {
+fn add_brace(spec: &BarrelSpec, here: Ring, there: Ring, body: &mut LimbBody) {
     let (from, to) = (body.middle(&here), body.middle(&there));
     let across = DVec3::Y.cross((to - from).normalize());
     let radius = spec.frame.brace_radius;

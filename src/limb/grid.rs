@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::spec::LimbSpec;
 
 /// The structured grid in (s, z): lines through every feature, cells that are material.
-pub(super) struct Grid {
+pub(super) struct LimbGrid {
     lines_s: Vec<f64>,
     lines_z: Vec<f64>,
     closed: bool,
@@ -17,7 +17,7 @@ pub(super) struct Grid {
     fixed_z: Vec<f64>,
 }
 
-impl Grid {
+impl LimbGrid {
     pub(super) fn new(spec: &LimbSpec) -> Self {
         let half = spec.column_width / 2.0;
         let mut fixed_s = Vec::new();

@@ -13,7 +13,7 @@ const RIM_LEVELS: isize = 4;
 
 /// Which rim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum Rim {
     Low,
     High,
 }
@@ -28,7 +28,7 @@ pub(super) struct Foot {
 
 /// Points (s around, y up, mm) and quadrilaterals, anticlockwise as seen from outside. Places that triangles and rims
 /// share are counted in half steps around and in levels up, so that they are the same point by their numbers.
-pub(super) struct Lattice {
+pub(super) struct LimbLattice {
     pub points: Vec<DVec2>,
     pub quads: Vec<[u32; 4]>,
     named: BTreeMap<(isize, isize), u32>,
@@ -44,7 +44,7 @@ pub(super) struct Lattice {
     height: f64,
 }
 
-impl Lattice {
+impl LimbLattice {
     /// The points and quadrilaterals of a whole barrel.
     pub fn new(spec: &BarrelSpec) -> Self {
         let pitch = spec.pitch();
@@ -78,11 +78,11 @@ impl Lattice {
     }
 
     /// The foot of a rod about a step around, in the middle of a rim.
-    pub fn foot(&self, column: isize, end: End) -> Foot {
+    pub fn foot(&self, column: isize, end: Rim) -> Foot {
         // The rod comes towards whoever looks from the axis at the lower rim, and arrives at the upper one.
         let (first, level, up) = match end {
-            End::Low => (0, -RIM_LEVELS / 2, -1),
-            End::High => (RIM_LEVELS * self.columns, self.levels + RIM_LEVELS / 2, 1),
+            Rim::Low => (0, -RIM_LEVELS / 2, -1),
+            Rim::High => (RIM_LEVELS * self.columns, self.levels + RIM_LEVELS / 2, 1),
         };
         let around = AROUND.map(|(i, j)| {
             let u = 2 * (column + i);

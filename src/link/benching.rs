@@ -4,10 +4,10 @@ use std::time::{Duration, Instant};
 
 use super::port::{Got, Port};
 use super::{Address, Recorder};
-use crate::bench::{Collector, Contact, Ended, News, Planned, SimulatedPrinter};
+use crate::bench::{Collector, CollectorNews, ContactLaw, Planned, RunEnd, SimulatedPrinter};
 use crate::board::SimulatedBoard;
 use crate::live::{Input, Receiver};
-use crate::wire::{Hello, Message, encode};
+use crate::wire::{Hello, WireMessage, encode};
 
 /// What whoever watches a bench may want.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,14 +34,14 @@ const TURN_US: u64 = 5000;
 const RATE_HZ: u16 = 200;
 
 /// Understands the board and writes down what belongs to readings.
-struct Desk {
+struct BenchWriter {
     receiver: Receiver,
     recorder: Recorder,
     hello: Option<Hello>,
     sequence: u16,
 }
 
-impl Desk {
+impl BenchWriter {
     fn new(recorder: Recorder) -> Self {
         Self {
             receiver: Receiver::default(),
@@ -54,7 +54,11 @@ impl Desk {
     /// What a board is told at first.
     fn greeting(&mut self) -> Vec<u8> {
         let mut bytes = vec![0];
-        for message in [Message::AskHello, Message::Rate(RATE_HZ), Message::Start] {
+        for message in [
+            WireMessage::AskHello,
+            WireMessage::Rate(RATE_HZ),
+            WireMessage::Start,
+        ] {
             encode(&message, self.sequence, 0, 12, &mut bytes);
             self.sequence = self.sequence.wrapping_add(1);
         }
@@ -68,7 +72,7 @@ impl Desk {
         now_us: u64,
         collector: &mut Collector,
         out: &mut Vec<u8>,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         let mut inputs = Vec::new();
         self.receiver
@@ -84,7 +88,7 @@ impl Desk {
                 Input::Sample(sample) => {
                     let recorder = &mut self.recorder;
                     collector.felt(&sample.counts, now_us, out, &mut |news| {
-                        if news == News::Keep {
+                        if news == CollectorNews::Keep {
                             recorder.sample(&sample);
                         } else {
                             note(recorder, &news);
@@ -98,25 +102,25 @@ impl Desk {
     }
 
     /// What the collector says without a sample.
-    fn hear(&mut self, news: News, tell: &mut dyn FnMut(News)) {
+    fn hear(&mut self, news: CollectorNews, tell: &mut dyn FnMut(CollectorNews)) {
         note(&mut self.recorder, &news);
         tell(news);
     }
 
-    fn end(mut self, ended: Option<Ended>) -> Result<Ended, String> {
+    fn end(mut self, ended: Option<RunEnd>) -> Result<RunEnd, String> {
         self.recorder.flush();
         match self.recorder.failed.take() {
             Some(why) => Err(why),
-            None => Ok(ended.unwrap_or(Ended::Stopped("it was left".into()))),
+            None => Ok(ended.unwrap_or(RunEnd::Stopped("it was left".into()))),
         }
     }
 }
 
 /// Notes are lines of a recording.
-fn note(recorder: &mut Recorder, news: &News) {
+fn note(recorder: &mut Recorder, news: &CollectorNews) {
     /// Characters that surely fit into a frame.
     const FITS: usize = 150;
-    if let News::Note(text) = news {
+    if let CollectorNews::Note(text) = news {
         recorder.own(&text.chars().take(FITS).collect::<String>());
         // A press that is written down is not lost, however the run ends.
         if text.starts_with("pressed") || text.starts_with("checked") {
@@ -131,13 +135,13 @@ fn note(recorder: &mut Recorder, news: &News) {
 /// When the recording can be written no more.
 pub fn press_simulated(
     collector: &mut Collector,
-    (mut printer, contact): (SimulatedPrinter, &Contact),
+    (mut printer, contact): (SimulatedPrinter, &ContactLaw),
     mut board: SimulatedBoard,
     recorder: Recorder,
     orders: &mut dyn FnMut() -> Option<BenchOrder>,
-    mut tell: impl FnMut(News),
-) -> Result<Ended, String> {
-    let mut desk = Desk::new(recorder);
+    mut tell: impl FnMut(CollectorNews),
+) -> Result<RunEnd, String> {
+    let mut desk = BenchWriter::new(recorder);
     let mut paused = false;
     let (mut now_us, mut said, mut sent) = (0, Vec::new(), Vec::new());
     board.receive(&desk.greeting(), now_us, &mut sent);
@@ -165,7 +169,8 @@ pub fn press_simulated(
         printer.receive(&out, &mut said);
         now_us += TURN_US;
         printer.say(now_us, &mut said);
-        let real = |axis: &crate::bench::Axis| printer.real(axis.letter).unwrap_or(axis.zero);
+        let real =
+            |axis: &crate::bench::MachineAxis| printer.real(axis.letter).unwrap_or(axis.zero);
         board.press(contact.push(&contact.machine.pose_of(real)));
         sent.clear();
         if desk.hello.is_none() {
@@ -189,13 +194,13 @@ pub fn press_at_ports(
     (printer, board): (&Address, &Address),
     recorder: Recorder,
     orders: &mut dyn FnMut() -> Option<BenchOrder>,
-    mut tell: impl FnMut(News),
-) -> Result<Ended, String> {
+    mut tell: impl FnMut(CollectorNews),
+) -> Result<RunEnd, String> {
     /// How long a machine that begins anew when its port is opened may take to do so.
     const BOOT: Duration = Duration::from_secs(2);
     let mut printer = printer.open()?;
     let mut board = board.open()?;
-    let mut desk = Desk::new(recorder);
+    let mut desk = BenchWriter::new(recorder);
     let mut buffer = [0_u8; 4096];
     let begun = Instant::now();
     let now = || begun.elapsed().as_micros() as u64;

@@ -22,14 +22,14 @@ struct Chunk {
 }
 
 /// A connection whose bytes are kept until it is listened to.
-pub struct Held {
+pub struct HeldConnection {
     reading: Option<JoinHandle<(TcpStream, VecDeque<Chunk>)>>,
     stop: Arc<AtomicBool>,
     /// When it was opened.
     pub(super) since: Instant,
 }
 
-impl Held {
+impl HeldConnection {
     /// Begins to keep what comes.
     ///
     /// # Errors
@@ -52,7 +52,7 @@ impl Held {
     pub(super) fn port(mut self) -> Option<Box<dyn Port>> {
         self.stop.store(true, Ordering::Relaxed);
         let (stream, kept) = self.reading.take()?.join().ok()?;
-        Some(Box::new(Kept {
+        Some(Box::new(KeptBytes {
             chunks: kept,
             read: 0,
             came: None,
@@ -61,7 +61,7 @@ impl Held {
     }
 }
 
-impl Drop for Held {
+impl Drop for HeldConnection {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
     }
@@ -90,7 +90,7 @@ fn keep(mut stream: TcpStream, stop: &AtomicBool) -> (TcpStream, VecDeque<Chunk>
     (stream, kept)
 }
 
-struct Kept {
+struct KeptBytes {
     chunks: VecDeque<Chunk>,
     /// How many bytes of the first were read.
     read: usize,
@@ -99,7 +99,7 @@ struct Kept {
     rest: Socket,
 }
 
-impl Port for Kept {
+impl Port for KeptBytes {
     fn read(&mut self, buffer: &mut [u8]) -> Got {
         let Some(first) = self.chunks.front() else {
             self.came = None;

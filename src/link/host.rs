@@ -246,13 +246,13 @@ mod terminal {
     const NAME: &str = "hapdef-board-";
 
     /// Both ends: ours, and the other's, which is held open so that one who leaves does not hang up on the next.
-    struct Ends {
+    struct PseudoTerminal {
         ours: File,
         _theirs: File,
     }
 
     struct Terminal {
-        ends: Option<Ends>,
+        ends: Option<PseudoTerminal>,
         /// A name that stays the same when the board is plugged in again.
         link: PathBuf,
     }
@@ -306,7 +306,7 @@ mod terminal {
             fcntl_setfl(&ours, OFlags::NONBLOCK)?;
             let _ = std::fs::remove_file(&self.link);
             symlink(&path, &self.link)?;
-            self.ends = Some(Ends {
+            self.ends = Some(PseudoTerminal {
                 ours: File::from(ours),
                 _theirs: theirs,
             });

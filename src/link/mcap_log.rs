@@ -19,7 +19,7 @@ use mcap::{McapError, WriteOptions, Writer};
 use serde_json::{Value, json};
 
 use crate::inference::Contact;
-use crate::live::Update;
+use crate::live::LiveUpdate;
 
 /// The frame at the hardest touch.
 const FRAME: &str = "contact";
@@ -77,7 +77,7 @@ impl McapLog {
     ///
     /// # Errors
     /// Why it can be written no more.
-    pub fn sample(&mut self, update: &Update) -> Result<(), String> {
+    pub fn sample(&mut self, update: &LiveUpdate) -> Result<(), String> {
         let first = *self.first_us.get_or_insert(update.time_us);
         let at = self.begun_ns + update.time_us.saturating_sub(first) * 1000;
         let none = Vec::new();

@@ -38,7 +38,7 @@ pub struct Depth {
 /// All presses that were finished in a recording's bytes, in their order. What was cut off in the middle is none.
 #[must_use]
 pub fn bench_presses(bytes: &[u8]) -> Vec<BenchPress> {
-    let mut scribe = Scribe::default();
+    let mut scribe = PressScribe::default();
     let mut receiver = Receiver::default();
     receiver.push(bytes, 0, |input| scribe.take(input));
     scribe.done
@@ -46,7 +46,7 @@ pub fn bench_presses(bytes: &[u8]) -> Vec<BenchPress> {
 
 /// Of a run that presses one place again and again, only what stands between two such presses that were alike is believed.
 #[derive(Default)]
-struct Scribe {
+struct PressScribe {
     board: Option<Hello>,
     open: Option<BenchPress>,
     /// What is read just now, with when it began.
@@ -58,7 +58,7 @@ struct Scribe {
     line: CountedLine,
 }
 
-impl Scribe {
+impl PressScribe {
     fn take(&mut self, input: Input) {
         match input {
             Input::Hello(hello) => self.board = Some(hello),

@@ -4,7 +4,7 @@ use super::truths::Truths;
 use super::{Recorder, replay};
 use crate::board::{SimulatedBoard, Truth};
 use crate::live::{Input, Receiver, Sample};
-use crate::wire::{Message, encode};
+use crate::wire::{WireMessage, encode};
 use crate::{memory, plain};
 
 /// The board's time between two looks at it (µs), about as often as a port is looked at.
@@ -17,7 +17,13 @@ const TURN_US: u64 = 4000;
 /// A message that says how large it would become, and what to change.
 pub fn check_length(seconds: f64, rate_hz: u16, channels: usize, bits: u8) -> Result<(), String> {
     let mut sample = Vec::new();
-    encode(&Message::Data(vec![0; channels]), 0, 0, bits, &mut sample);
+    encode(
+        &WireMessage::Data(vec![0; channels]),
+        0,
+        0,
+        bits,
+        &mut sample,
+    );
     let bytes = seconds * f64::from(rate_hz) * sample.len() as f64;
     let most = replay::most_bytes();
     if bytes <= most {
@@ -43,7 +49,7 @@ pub fn record(
     mut tell: impl FnMut(Truth),
 ) -> Result<u64, String> {
     let end_us = (seconds * 1e6) as u64;
-    let mut scribe = Scribe::new(recorder);
+    let mut scribe = RecordScribe::new(recorder);
     let (mut now_us, mut plugged) = (0, false);
     while now_us <= end_us {
         if board.is_unplugged(now_us) {
@@ -76,14 +82,14 @@ pub fn record(
 /// What one who listens says first.
 fn greeting() -> Vec<u8> {
     let mut bytes = Vec::new();
-    for (sequence, message) in (0..).zip([Message::AskHello, Message::Start]) {
+    for (sequence, message) in (0..).zip([WireMessage::AskHello, WireMessage::Start]) {
         encode(&message, sequence, 0, 12, &mut bytes);
     }
     bytes
 }
 
 /// Understands the board's bytes as one who listens does, and writes them down.
-struct Scribe {
+struct RecordScribe {
     recorder: Recorder,
     receiver: Receiver,
     /// Whether the board has said what it is, without which nothing else is understood.
@@ -91,7 +97,7 @@ struct Scribe {
     truths: Truths,
 }
 
-impl Scribe {
+impl RecordScribe {
     fn new(recorder: Recorder) -> Self {
         Self {
             recorder,
@@ -148,8 +154,8 @@ mod tests {
     use crate::inference::Chain;
     use crate::wire::Hello;
 
-    fn scribe(path: &Path) -> Scribe {
-        let mut scribe = Scribe::new(Recorder::create(path).unwrap());
+    fn scribe(path: &Path) -> RecordScribe {
+        let mut scribe = RecordScribe::new(Recorder::create(path).unwrap());
         let chain = Chain::default();
         scribe.recorder.hello(&Hello {
             version: crate::wire::VERSION,

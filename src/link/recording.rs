@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::live::{Rest, Sample};
-use crate::wire::{Hello, Message, encode};
+use crate::wire::{Hello, WireMessage, encode};
 
 /// How long a sample may wait in memory.
 const FLUSH: Duration = Duration::from_millis(100);
@@ -70,7 +70,7 @@ impl Recorder {
         }
     }
 
-    fn put(&mut self, message: &Message) {
+    fn put(&mut self, message: &WireMessage) {
         let before = self.pending.len();
         let bits = self.layout.map_or(12, |(_, bits)| bits);
         encode(
@@ -90,7 +90,7 @@ impl Recorder {
     /// What the board says of itself; its samples have this many channels and bits from now on.
     pub fn hello(&mut self, hello: &Hello) {
         self.layout = Some((usize::from(hello.channels), hello.bits));
-        self.put(&Message::Hello(hello.clone()));
+        self.put(&WireMessage::Hello(hello.clone()));
     }
 
     pub fn sample(&mut self, sample: &Sample) {
@@ -102,7 +102,7 @@ impl Recorder {
         });
         if fits {
             let counts = sample.counts.iter().map(|c| *c as u32).collect();
-            self.put(&Message::Data(counts));
+            self.put(&WireMessage::Data(counts));
         } else {
             self.line(&sample.counts);
         }
@@ -121,7 +121,7 @@ impl Recorder {
 
     /// What was done: “tare”, “rest …”, “truth …”.
     pub fn own(&mut self, text: &str) {
-        self.put(&Message::Note(text.to_owned()));
+        self.put(&WireMessage::Note(text.to_owned()));
     }
 
     /// Where the rest lay when the recording began, so that it can be replayed from there.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::port::{Got, Pace, Port};
 use crate::memory;
 use crate::plain;
-use crate::wire::{Decoder, Event};
+use crate::wire::{Decoded, Decoder};
 
 /// The longest that is waited for between two frames (µs): no board is slower than one sample a second, and a
 /// clock that leapt would be waited for in vain.
@@ -73,12 +73,12 @@ fn frames(bytes: &[u8]) -> Result<Vec<(usize, u64)>, String> {
     for piece in bytes.split_inclusive(|&b| b == 0) {
         end += piece.len();
         decoder.push(piece, |event| match event {
-            Event::Message { time_us, .. } => {
+            Decoded::Message { time_us, .. } => {
                 due += u64::from(last.map_or(0, |last| step(last, time_us)));
                 last = Some(time_us);
                 frames.push((end, due));
             }
-            Event::Refused(refusal) if why.is_none() => why = refusal.in_words(),
+            Decoded::Refused(refusal) if why.is_none() => why = refusal.in_words(),
             _ => {}
         });
     }
@@ -132,12 +132,12 @@ impl Port for Replay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{Message, encode};
+    use crate::wire::{WireMessage, encode};
 
     fn note(time_us: u32, sequence: u16) -> Vec<u8> {
         let mut bytes = Vec::new();
         encode(
-            &Message::Note("tare".into()),
+            &WireMessage::Note("tare".into()),
             sequence,
             time_us,
             12,

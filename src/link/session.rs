@@ -13,13 +13,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
-use super::{Got, Held, Port, old_note};
+use super::{Got, HeldConnection, Port, old_note};
 use crate::live::{Input, Unusable};
 use crate::plain;
-use crate::wire::{Hello, Message};
+use crate::wire::{Hello, WireMessage};
 
 pub use connection::Connection;
-pub use listener::{Listener, ListenerCommand, SessionEvent, State};
+pub use listener::{ConnectionState, Listener, ListenerCommand, SessionEvent};
 pub use timing::Timing;
 
 /// Asked again so often while nothing is understood; silence that is told.
@@ -41,7 +41,7 @@ impl Listener {
         inbox: &Inbox<ListenerCommand>,
         mut tell: impl FnMut(SessionEvent),
     ) -> Result<(), String> {
-        let mut port = match self.held.take().and_then(Held::port) {
+        let mut port = match self.held.take().and_then(HeldConnection::port) {
             Some(port) => port,
             None => self.address.open()?,
         };
@@ -50,7 +50,7 @@ impl Listener {
             self.begin_recording();
         }
         loop {
-            self.enter(State::Waiting, &mut tell);
+            self.enter(ConnectionState::Waiting, &mut tell);
             self.listen(&mut *port, stop, inbox, &mut tell);
             self.flush_recording(&mut tell);
             if stop.load(Ordering::Relaxed) {
@@ -59,7 +59,7 @@ impl Listener {
             if self.address.is_recording() {
                 return self.end(&mut tell);
             }
-            self.enter(State::Gone, &mut tell);
+            self.enter(ConnectionState::Gone, &mut tell);
             match self.find_again(stop, inbox, &mut tell) {
                 Some(again) => port = again,
                 None => return Ok(()),
@@ -76,7 +76,7 @@ impl Listener {
                     "frames of the recording that are damaged or not understood, and were left out: {refused}"
                 )));
             }
-            self.enter(State::Ended, tell);
+            self.enter(ConnectionState::Ended, tell);
             return Ok(());
         }
         let why = self.receiver.unusable().and_then(Unusable::in_words);
@@ -106,9 +106,9 @@ impl Listener {
             while let Ok(command) = inbox.try_recv() {
                 self.obey(command, port, tell);
             }
-            let live = self.state == State::Live;
+            let live = self.state == ConnectionState::Live;
             if !live && !self.receiver.speaks_lines() && asked.is_none_or(|t| t.elapsed() > ASK) {
-                self.say(port, &Message::AskHello);
+                self.say(port, &WireMessage::AskHello);
                 asked = Some(Instant::now());
             }
             match port.read(&mut buffer) {
@@ -126,8 +126,8 @@ impl Listener {
                 }
             }
             // Bytes that cannot be used are silence too.
-            if self.state == State::Live && self.last_arrival.elapsed() > SILENCE {
-                self.enter(State::Silent, tell);
+            if self.state == ConnectionState::Live && self.last_arrival.elapsed() > SILENCE {
+                self.enter(ConnectionState::Silent, tell);
             }
             self.explain(tell);
             self.turn(tell);
@@ -193,10 +193,10 @@ impl Listener {
             .rate
             .filter(|&r| r != hello.rate_hz && self.hello.as_ref() != Some(&hello))
         {
-            self.say(port, &Message::Rate(rate));
+            self.say(port, &WireMessage::Rate(rate));
         }
         self.hello = Some(hello);
-        self.say(port, &Message::Start);
+        self.say(port, &WireMessage::Start);
     }
 }
 

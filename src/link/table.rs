@@ -9,12 +9,12 @@ use std::sync::mpsc::channel;
 use anyhow::Context as _;
 
 use super::{Address, Listener, Pace, SessionEvent};
-use crate::inference::Touches;
-use crate::live::{Pipeline, Sample, Update};
+use crate::inference::SeveralTouches;
+use crate::live::{LiveUpdate, Pipeline, Sample};
 
 /// A table of samples, with the truth where a simulated board has told it. Each file has as many columns in every
 /// row: one for each number of channels.
-pub struct Table {
+pub struct SampleTable {
     /// The last one is being written.
     paths: Vec<PathBuf>,
     file: BufWriter<File>,
@@ -23,7 +23,7 @@ pub struct Table {
     channels: Option<usize>,
 }
 
-impl Table {
+impl SampleTable {
     /// Begins a table; never over an older one.
     ///
     /// # Errors
@@ -64,7 +64,11 @@ impl Table {
     ///
     /// # Errors
     /// When it can be written no more.
-    pub fn take(&mut self, sample: &Sample, update: &Update) -> anyhow::Result<Option<PathBuf>> {
+    pub fn take(
+        &mut self,
+        sample: &Sample,
+        update: &LiveUpdate,
+    ) -> anyhow::Result<Option<PathBuf>> {
         let channels = sample.counts.len();
         let before = self.channels.replace(channels);
         let moved = before.is_some_and(|b| b != channels);
@@ -119,7 +123,7 @@ impl Table {
         )
     }
 
-    fn row(&mut self, sample: &Sample, update: &Update) -> std::io::Result<()> {
+    fn row(&mut self, sample: &Sample, update: &LiveUpdate) -> std::io::Result<()> {
         write!(self.file, "{}", sample.time_us)?;
         for count in &sample.counts {
             write!(self.file, ",{count}")?;
@@ -143,7 +147,10 @@ impl Table {
             None => write!(self.file, ",,,,,,,,")?,
         }
         // How many touch; empty where that is not clear.
-        let touching = update.touches.as_ref().map_or(Some(0), Touches::count);
+        let touching = update
+            .touches
+            .as_ref()
+            .map_or(Some(0), SeveralTouches::count);
         let touching = touching.map_or(String::new(), |count| count.to_string());
         write!(self.file, ",{},{touching}", update.good)?;
         match self.truth {
@@ -196,7 +203,7 @@ pub fn write_table(
         path: recording.to_owned(),
         pace: Pace::Fast,
     };
-    let mut rows = Table::replace(table)?;
+    let mut rows = SampleTable::replace(table)?;
     let (_commands, inbox) = channel();
     let stop = AtomicBool::new(false);
     let mut written: anyhow::Result<Option<PathBuf>> = Ok(None);
@@ -219,9 +226,9 @@ pub fn write_table(
 mod tests {
     use super::*;
 
-    fn sample(time_us: u64, channels: usize) -> (Sample, Update) {
+    fn sample(time_us: u64, channels: usize) -> (Sample, LiveUpdate) {
         let counts = vec![7.0; channels];
-        let update = Update::nothing(time_us);
+        let update = LiveUpdate::nothing(time_us);
         (Sample { time_us, counts }, update)
     }
 
@@ -231,7 +238,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("a-2.csv"), "older").unwrap();
-        let mut table = Table::create(&at("a.csv")).unwrap();
+        let mut table = SampleTable::create(&at("a.csv")).unwrap();
         let mut moved = Vec::new();
         for (time, channels) in [(1, 2), (2, 2), (3, 4), (4, 4), (5, 2)] {
             let (sample, update) = sample(time, channels);
@@ -254,9 +261,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         std::fs::write(&path, "").unwrap();
-        drop(Table::create(&path).unwrap());
+        drop(SampleTable::create(&path).unwrap());
         std::fs::write(&path, "older").unwrap();
-        let said = Table::create(&path).err().unwrap().to_string();
+        let said = SampleTable::create(&path).err().unwrap().to_string();
         assert!(said.contains("a.csv") && said.contains("already"), "{said}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "older");
     }
@@ -264,7 +271,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn a_table_on_a_full_disk_says_so() {
-        let mut table = Table::create(Path::new("/dev/full")).unwrap();
+        let mut table = SampleTable::create(Path::new("/dev/full")).unwrap();
         let (first, update) = sample(1, 2);
         table.take(&first, &update).unwrap();
         let said = format!("{:#}", table.flush().unwrap_err());

@@ -64,7 +64,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::inference::{Errors, ResponseMap};
+    use crate::inference::{ReadingErrors, ResponseMap};
     use crate::mesh::TriMesh;
 
     #[test]
@@ -78,7 +78,7 @@ mod tests {
             values[2 * node + channel] = -1e-5;
         }
         let map = Arc::new(ResponseMap::of(Arc::new(mesh), 2, values));
-        let mut matching = Matching::new(map, Errors::of_noise(1e-6, 2), 50.0);
+        let mut matching = Matching::new(map, ReadingErrors::of_noise(1e-6, 2), 50.0);
         let mut blind = Blind::default();
         let noise = [9e-6; 2];
         let near = |found: (f64, bool), share: f64, is_news: bool| {

@@ -1,6 +1,6 @@
 //! Whether every gauge does what it should: by itself, and as the others say of a touch.
 
-use super::health::{Expected, Health, Watcher};
+use super::health::{ExpectedSignal, Health, Watcher};
 use super::tare::Rest;
 use crate::inference::Matching;
 use crate::statistics::median;
@@ -86,7 +86,7 @@ impl Checking {
         // Before there is a rest, nobody knows what is noisy.
         let usual = self.usual.unwrap_or(f64::INFINITY);
         for (k, (watcher, &count)) in self.watchers.iter_mut().zip(counts).enumerate() {
-            let expected = Expected {
+            let expected = ExpectedSignal {
                 // Of plain lines nobody knows the range.
                 lowest: highest.map_or(f64::NEG_INFINITY, |_| 1.0),
                 highest: highest.map_or(f64::INFINITY, |h| h - 1.0),

@@ -1,7 +1,7 @@
 //! How many touches there are, over time: two looks that say the same are believed, and in between all touches are followed
 //! together.
 
-use crate::inference::{Contact, Matching, Several, Touches};
+use crate::inference::{Contact, Matching, Several, SeveralTouches};
 
 /// Seconds between looks: while what is shown is what was seen, and while it is not.
 const SETTLED_S: f64 = 0.2;
@@ -22,7 +22,7 @@ pub(super) struct Counting {
     /// Where several are searched for.
     pub several: Several,
     /// Touches that are more than one point; absent while there is one.
-    shown: Option<Touches>,
+    shown: Option<SeveralTouches>,
     /// Looks in a row that doubted it.
     doubted: u32,
     last_look: Option<u64>,
@@ -61,7 +61,7 @@ impl Counting {
     }
 
     /// The touches that go on, where they are more than one point, and whether they explain this sample (strain).
-    pub fn track(&mut self, matching: &Matching, strain: &[f64]) -> Option<(Touches, bool)> {
+    pub fn track(&mut self, matching: &Matching, strain: &[f64]) -> Option<(SeveralTouches, bool)> {
         let shown = self.shown.as_ref()?;
         if shown.contacts.is_empty() {
             if squares(matching, strain) > GROWN * self.felt {
@@ -75,7 +75,7 @@ impl Counting {
         if let Some(tracked) = tracked {
             let unexplained = shown.unexplained;
             // As far as the last look went: what is off little by little is off.
-            self.shown = Some(Touches {
+            self.shown = Some(SeveralTouches {
                 unexplained,
                 ..tracked
             });
@@ -84,13 +84,13 @@ impl Counting {
     }
 
     /// The touches that were seen last, where they are more than one point.
-    pub fn shown(&self) -> Option<&Touches> {
+    pub fn shown(&self) -> Option<&SeveralTouches> {
         self.shown.as_ref()
     }
 
     /// One touch, as sure as the last look was of that.
-    pub fn one(&self, contact: Contact) -> Touches {
-        Touches::one(contact, self.sure_of_one)
+    pub fn one(&self, contact: Contact) -> SeveralTouches {
+        SeveralTouches::one(contact, self.sure_of_one)
     }
 
     /// Whether touches that leave so much unexplained are what the last look saw.
@@ -115,7 +115,7 @@ impl Counting {
         let seen = matching.count(&self.several, strain, one);
         let channels = matching.used.iter().filter(|u| **u).count() as f64;
         self.usual = MORE * seen.unexplained + channels + BEYOND * (2.0 * channels).sqrt();
-        let one = Touches::one(*one, 1.0);
+        let one = SeveralTouches::one(*one, 1.0);
         let shown = self.shown.as_ref().unwrap_or(&one);
         let share = seen.share_of(shown);
         self.doubted = if share < DOUBTED { self.doubted + 1 } else { 0 };

@@ -21,11 +21,11 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::inference::{Kind, Touches};
+use crate::inference::{SeveralTouches, TouchKind};
 
 use self::creep::Creep;
 use self::misfit::Misfit;
-use self::walk::Walk;
+use self::walk::RestWalk;
 
 /// Seconds that samples are gathered for before the rest is corrected by their mean.
 const BLOCK_S: f64 = 0.01;
@@ -43,7 +43,7 @@ const STEADY_BY: f64 = 1.5e-6;
 const CAUTION: f64 = 16.0;
 
 /// Samples at rest whose mean is to be believed.
-struct Block {
+struct RestBlock {
     ends_s: f64,
     mean: Vec<f64>,
     samples: f64,
@@ -55,7 +55,7 @@ pub(super) struct Drift {
     level: Vec<f64>,
     /// P of the rest of every channel and, at the end, of the speed v (strain, strain a second).
     covariance: DMatrix<f64>,
-    walk: Walk,
+    walk: RestWalk,
     creep: Creep,
     misfit: Misfit,
     /// Seconds since the tare, and as of when b and P are.
@@ -65,7 +65,7 @@ pub(super) struct Drift {
     gathered: Vec<f64>,
     samples: f64,
     since_s: f64,
-    waiting: VecDeque<Block>,
+    waiting: VecDeque<RestBlock>,
     /// Whether the last samples were of a touch, and whether any at rest were believed since the last one.
     under_touch: bool,
     believed: bool,
@@ -81,8 +81,8 @@ impl Drift {
     /// rest of a channel follows it within `follows_s` seconds at a rate (Hz).
     pub fn new(noise: &[f64], drift: &[f64], follows_s: f64, rate: f64) -> Self {
         let channels = noise.len();
-        let walk = Walk::new(noise, drift, follows_s, rate);
-        let covariance = Walk::after_tare(noise);
+        let walk = RestWalk::new(noise, drift, follows_s, rate);
+        let covariance = RestWalk::after_tare(noise);
         Self {
             level: vec![0.0; channels],
             ahead: covariance.clone(),
@@ -152,7 +152,7 @@ impl Drift {
         let Some((mean, samples)) = self.gather(strain) else {
             return false;
         };
-        self.waiting.push_back(Block {
+        self.waiting.push_back(RestBlock {
             ends_s: self.now_s,
             mean,
             samples,
@@ -170,7 +170,7 @@ impl Drift {
     /// Takes what was read at rest so many seconds ago, and has been steady since.
     fn believe(&mut self, ago_s: f64, noise: &[f64], used: &[bool]) {
         let until = self.now_s - ago_s;
-        let old = |block: &Block| block.ends_s <= until;
+        let old = |block: &RestBlock| block.ends_s <= until;
         while self.waiting.front().is_some_and(old) {
             let steady = self.is_steady(noise, used);
             let Some(block) = self.waiting.pop_front() else {
@@ -210,7 +210,7 @@ impl Drift {
     /// ways in which it may be another touch (columns of J, strain). Whether more is known of the rest now.
     pub fn touched(
         &mut self,
-        touches: &Touches,
+        touches: &SeveralTouches,
         [reading, left]: [&[f64]; 2],
         noise: &[f64],
         used: &[bool],
@@ -228,7 +228,7 @@ impl Drift {
         }
         let beyond = match &touches.contacts[..] {
             [touch] if touch.narrow => {
-                let is_area = matches!(touches.kind, Kind::Area(_));
+                let is_area = matches!(touches.kind, TouchKind::Area(_));
                 let touch = (touch.position, touch.force, is_area);
                 (self.misfit).beyond(touch, &mean, ways)
             }

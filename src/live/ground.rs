@@ -5,7 +5,7 @@ use super::hum::Hum;
 use super::tare::Rest;
 use super::tremble::Tremble;
 use super::update::PipelineSettings;
-use crate::inference::{Errors, Matching, Touches};
+use crate::inference::{Matching, ReadingErrors, SeveralTouches};
 use crate::uncertainty::rounding;
 
 /// Seconds after which what no touch explains is the rest, that has moved.
@@ -36,7 +36,7 @@ pub(super) enum Under<'a> {
     /// Nothing, or something that may be about to begin.
     Nothing { at_rest: bool },
     /// Touches.
-    Touches(&'a Touches),
+    Touches(&'a SeveralTouches),
     /// Something that touches do not explain.
     Strange,
     /// A touch that goes, or one that is just looked for.
@@ -221,7 +221,7 @@ impl KnownRest {
 
     /// What an estimator has to put up with, where the project knows all channels to have drifted by so much together
     /// (strain).
-    pub fn allow_for(&self, known_drift: f64, errors: &mut Errors) {
+    pub fn allow_for(&self, known_drift: f64, errors: &mut ReadingErrors) {
         let (own, common) = (self.drift.as_ref())
             .map_or_else(|| (vec![0.0; self.noise.len()], 0.0), Drift::variances);
         for ((error, noise), own) in errors.noise.iter_mut().zip(&self.noise).zip(own) {

@@ -61,7 +61,7 @@ pub struct Watcher {
 
 /// What a channel is held against.
 #[derive(Clone, Copy, Debug)]
-pub struct Expected {
+pub struct ExpectedSignal {
     /// Ends of the converter's range.
     pub lowest: f64,
     /// Upper end of the converter's range (counts).
@@ -92,7 +92,7 @@ const MOST_OF_A_LOOK: f64 = 4.0;
 
 impl Watcher {
     /// Looks at one more sample, of which so much is hum; nothing where that is not known, and what trembles not either.
-    pub fn push(&mut self, count: f64, hum: Option<f64>, expected: &Expected) {
+    pub fn push(&mut self, count: f64, hum: Option<f64>, expected: &ExpectedSignal) {
         self.same = if self.seen && count == self.last {
             self.same + 1
         } else {
@@ -142,7 +142,7 @@ impl Watcher {
 
     /// What is to be thought of it now.
     #[must_use]
-    pub fn health(&self, expected: &Expected) -> Health {
+    pub fn health(&self, expected: &ExpectedSignal) -> Health {
         let within = |samples: u64, seconds: f64| (samples as f64) < seconds * expected.rate;
         if self.off_scale.is_some_and(|n| n == 0 || within(n, HOLD_S)) {
             Health::OffScale
@@ -162,7 +162,7 @@ impl Watcher {
 mod tests {
     use super::*;
 
-    const EXPECTED: Expected = Expected {
+    const EXPECTED: ExpectedSignal = ExpectedSignal {
         lowest: 0.0,
         highest: 4095.0,
         own_noise: 1.5,
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn steep_touches_are_no_noise_at_any_rate() {
         for rate in [100.0, 1000.0, 4000.0] {
-            let expected = Expected { rate, ..EXPECTED };
+            let expected = ExpectedSignal { rate, ..EXPECTED };
             for ramp_s in [0.002, 0.01, 0.08] {
                 let mut watcher = Watcher::default();
                 for k in 0..(5.0 * rate) as u32 {
@@ -234,7 +234,7 @@ mod tests {
     /// Hum is as steep as noise where samples are few, and is none.
     #[test]
     fn what_hums_is_no_noise() {
-        let expected = Expected {
+        let expected = ExpectedSignal {
             rate: 200.0,
             ..EXPECTED
         };

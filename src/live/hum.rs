@@ -34,7 +34,7 @@ const ROUNDING: f64 = 0.25;
 
 /// One frequency.
 #[derive(Clone, Debug)]
-struct Line {
+struct HumLine {
     hertz: f64,
     /// At the last sample (rad).
     phase: f64,
@@ -43,17 +43,17 @@ struct Line {
 }
 
 /// Samples: when (s), and what every channel read.
-pub(super) type Rows = VecDeque<(f64, Vec<f64>)>;
+pub(super) type HumSamples = VecDeque<(f64, Vec<f64>)>;
 
 /// What hums.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Hum {
-    lines: Vec<Line>,
+    lines: Vec<HumLine>,
     level: Vec<f64>,
     /// What readings are off by at rest, without the lines (counts, mean of the absolute values).
     usual: Vec<f64>,
     now_s: f64,
-    rested: Rows,
+    rested: HumSamples,
     /// When it was last looked for.
     looked_s: f64,
 }
@@ -117,7 +117,7 @@ impl Hum {
 
     /// What the lines put on readings (counts, rms) of every channel.
     pub fn rms(&self, channel: usize) -> f64 {
-        let square = |line: &Line| {
+        let square = |line: &HumLine| {
             let [a, b] = line.waves.get(channel).copied().unwrap_or_default();
             f64::midpoint(a * a, b * b)
         };
@@ -157,7 +157,7 @@ impl Hum {
     }
 
     /// Takes the lines of some rest (s, counts) for what hums from its last sample on, and off these.
-    pub fn begin(&mut self, rows: &Rows) -> Rows {
+    pub fn begin(&mut self, rows: &HumSamples) -> HumSamples {
         self.forget();
         let (lines, left) = lines(rows);
         (self.lines, self.usual) = (lines, scatter(&left));
@@ -166,9 +166,9 @@ impl Hum {
 }
 
 /// The lines of some samples, with their phases at the last one, and what is left of the samples without them.
-fn lines(rows: &Rows) -> (Vec<Line>, Rows) {
+fn lines(rows: &HumSamples) -> (Vec<HumLine>, HumSamples) {
     let mut left = rows.clone();
-    let mut found: Vec<Line> = Vec::new();
+    let mut found: Vec<HumLine> = Vec::new();
     let (Some(first), Some(last)) = (rows.front(), rows.back()) else {
         return (found, left);
     };
@@ -191,7 +191,7 @@ fn lines(rows: &Rows) -> (Vec<Line>, Rows) {
         if strength < free + CLEAR * (2.0 * free).sqrt() {
             break;
         }
-        let line = Line::fitted(&left, &middle, hertz);
+        let line = HumLine::fitted(&left, &middle, hertz);
         line.take_from(&mut left);
         found.push(line);
     }
@@ -207,14 +207,14 @@ fn candidates(rate: f64) -> Vec<f64> {
         .collect()
 }
 
-fn level(rows: &Rows) -> Vec<f64> {
+fn level(rows: &HumSamples) -> Vec<f64> {
     let channels = rows.front().map_or(0, |r| r.1.len());
     let of = |c: usize| mean(&rows.iter().map(|r| r.1[c]).collect::<Vec<_>>());
     (0..channels).map(of).collect()
 }
 
 /// What every channel of some samples is off its mean by (counts, mean of the absolute values).
-fn scatter(rows: &Rows) -> Vec<f64> {
+fn scatter(rows: &HumSamples) -> Vec<f64> {
     let middle = level(rows);
     let of = |(c, middle): (usize, &f64)| {
         let off: Vec<f64> = rows.iter().map(|r| (r.1[c] - middle).abs()).collect();
@@ -244,7 +244,7 @@ fn waves<'a>(
 }
 
 /// Over the scatter of each channel: as χ² where there is noise alone, the largest near a frequency.
-fn strength(rows: &Rows, level: &[f64], hertz: f64) -> f64 {
+fn strength(rows: &HumSamples, level: &[f64], hertz: f64) -> f64 {
     let last = rows.back().map_or(0.0, |r| r.0);
     let count = rows.len() as f64;
     let variance = |c: usize| {
@@ -265,9 +265,9 @@ fn strength(rows: &Rows, level: &[f64], hertz: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-impl Line {
+impl HumLine {
     /// The line near a frequency that fits samples best.
-    fn fitted(rows: &Rows, level: &[f64], mut hertz: f64) -> Self {
+    fn fitted(rows: &HumSamples, level: &[f64], mut hertz: f64) -> Self {
         let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
         let half = rows.len() / 2;
         for _ in 0..3 {
@@ -289,7 +289,7 @@ impl Line {
         }
     }
 
-    fn take_from(&self, rows: &mut Rows) {
+    fn take_from(&self, rows: &mut HumSamples) {
         let last = rows.back().map_or(0.0, |r| r.0);
         for (at, values) in rows {
             let (sin, cos) = (TAU * self.hertz * (*at - last)).sin_cos();

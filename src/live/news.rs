@@ -5,7 +5,7 @@ use crate::uncertainty::BLIND;
 
 /// What a pipeline has to say of its rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum News {
+pub enum RestNews {
     /// Something moves while the rest is taken.
     Waiting,
     /// The rest was taken under a touch that has let go.
@@ -14,7 +14,7 @@ pub enum News {
     Blind(f64),
 }
 
-impl News {
+impl RestNews {
     /// For people, with what to do.
     #[must_use]
     pub fn in_words(self) -> String {

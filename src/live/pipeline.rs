@@ -11,13 +11,13 @@ use super::feeling::{Feeling, Turn};
 use super::ground::{KnownRest, Under};
 use super::health::Health;
 use super::hum::Hum;
-use super::news::News;
+use super::news::RestNews;
 use super::receiver::Sample;
 use super::release::Release;
 use super::tare::{Rest, Taring};
-use super::update::{GaugeModel, Guess, PipelineSettings, Update};
+use super::update::{GaugeModel, Guess, LiveUpdate, PipelineSettings};
 use crate::dataset::SignalMatrix;
-use crate::inference::{Contact, Matching, Touches, Trained};
+use crate::inference::{Contact, Matching, SeveralTouches, TrainedLive};
 use crate::learning::TouchEstimator;
 use crate::wire::Hello;
 
@@ -36,7 +36,7 @@ pub struct Pipeline {
     /// Thresholds and constants.
     pub settings: PipelineSettings,
     matching: Matching,
-    trained: [Option<Arc<Trained>>; 2],
+    trained: [Option<Arc<TrainedLive>>; 2],
     /// What the trained ones were trained with: with other channels they say nothing.
     trained_for: Vec<bool>,
     /// What was learned from presses alone: by all channels.
@@ -59,7 +59,7 @@ pub struct Pipeline {
     release: Release,
     /// Whether a touch has come and gone since the tare, and left the rest where it was.
     proved: bool,
-    news: Option<News>,
+    news: Option<RestNews>,
     blind: Blind,
 }
 
@@ -126,7 +126,7 @@ impl Pipeline {
     }
 
     /// The trained estimators (normalized, raw) and which gauges they were trained with.
-    pub fn set_trained(&mut self, trained: [Option<Arc<Trained>>; 2], used: Vec<bool>) {
+    pub fn set_trained(&mut self, trained: [Option<Arc<TrainedLive>>; 2], used: Vec<bool>) {
         (self.trained, self.trained_for) = (trained, used);
     }
 
@@ -209,7 +209,7 @@ impl Pipeline {
 
     /// What has come to pass with the rest at the last sample.
     #[must_use]
-    pub fn news(&self) -> Option<News> {
+    pub fn news(&self) -> Option<RestNews> {
         self.news
     }
 
@@ -245,13 +245,13 @@ impl Pipeline {
     }
 
     /// Takes a sample in and says what it means.
-    pub fn push(&mut self, sample: &Sample) -> Update {
+    pub fn push(&mut self, sample: &Sample) -> LiveUpdate {
         self.news = None;
         let step_s = self.step(sample.time_us);
         let counts: Option<Vec<f64>> = (self.settings.channels.iter())
             .map(|&c| sample.counts.get(c).copied())
             .collect();
-        let nothing = Update::nothing(sample.time_us);
+        let nothing = LiveUpdate::nothing(sample.time_us);
         // A board with fewer channels than the project has gauges.
         let Some(mut counts) = counts else {
             return nothing;
@@ -270,7 +270,7 @@ impl Pipeline {
         };
         self.matching.used = self.checking.used();
         let (blind, is_news) = self.blind.look(&self.matching, &self.ground.noise);
-        self.news = is_news.then_some(News::Blind(blind));
+        self.news = is_news.then_some(RestNews::Blind(blind));
         self.feel(&strain);
         let (touches, explained) = if self.feeling.touching {
             self.find(sample.time_us, &strain)
@@ -279,7 +279,7 @@ impl Pipeline {
         };
         if self.release.is_sure(self.proved) {
             self.tare();
-            self.news = Some(News::Released);
+            self.news = Some(RestNews::Released);
             return nothing;
         }
         let contact = (touches.as_ref()).and_then(|t| t.contacts.first().copied());
@@ -296,7 +296,7 @@ impl Pipeline {
             touches.as_ref().map(|t| (t, explained)),
             step_s,
         );
-        Update {
+        LiveUpdate {
             strain: Some(strain),
             contact,
             touches,
@@ -322,7 +322,7 @@ impl Pipeline {
         let waited = taring.is_waiting();
         let rest = taring.push(time_us, counts);
         if taring.is_waiting() && !waited {
-            self.news = Some(News::Waiting);
+            self.news = Some(RestNews::Waiting);
         }
         if let Some(rest) = rest {
             let hum = std::mem::take(&mut taring.hum);
@@ -346,7 +346,7 @@ impl Pipeline {
     }
 
     /// What the sample says of the rest, where it is of touches that explain it or of none.
-    fn follow(&mut self, strains: [&[f64]; 2], seen: Option<(&Touches, bool)>, step_s: f64) {
+    fn follow(&mut self, strains: [&[f64]; 2], seen: Option<(&SeveralTouches, bool)>, step_s: f64) {
         let touching = self.feeling.touching;
         let (touches, explained) = seen.unzip();
         let under = match touches {
@@ -386,7 +386,7 @@ impl Pipeline {
     }
 
     /// The touches, and whether they explain the sample; nothing where the reading is rather of something that lets go.
-    fn find(&mut self, time_us: u64, strain: &[f64]) -> (Option<Touches>, bool) {
+    fn find(&mut self, time_us: u64, strain: &[f64]) -> (Option<SeveralTouches>, bool) {
         let several = self.counting.track(&self.matching, strain);
         if let Some((touches, explained)) = several {
             let left = if explained {

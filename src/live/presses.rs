@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::update::Update;
+use super::update::LiveUpdate;
 
 /// Seconds that a press is read for, and that pass between two looks at it.
 const READ_S: f64 = 0.5;
@@ -42,7 +42,12 @@ impl Presses {
     }
 
     /// Takes in a sample, with the noise of each channel (strain) and whether it is trusted; the press that is over by now.
-    pub fn push(&mut self, update: &Update, noise: &[f64], used: &[bool]) -> Option<FinishedPress> {
+    pub fn push(
+        &mut self,
+        update: &LiveUpdate,
+        noise: &[f64],
+        used: &[bool],
+    ) -> Option<FinishedPress> {
         let now = update.time_us;
         if let (Some(_), Some(strain)) = (&update.touches, &update.strain) {
             let from = self.felt.map_or(now, |[from, _]| from);
@@ -113,9 +118,9 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::inference::{Contact, CredibleRegion, Touches};
+    use crate::inference::{Contact, CredibleRegion, SeveralTouches};
 
-    fn update(k: u64, strain: f64) -> Update {
+    fn update(k: u64, strain: f64) -> LiveUpdate {
         let contact = Contact {
             position: DVec3::ZERO,
             normal: DVec3::Z,
@@ -131,10 +136,10 @@ mod tests {
             narrow: true,
             unexplained: 1.0,
         };
-        Update {
+        LiveUpdate {
             strain: Some(vec![strain, -strain, 0.0]),
-            touches: (strain != 0.0).then(|| Touches::one(contact, 1.0)),
-            ..Update::nothing(k * 10_000)
+            touches: (strain != 0.0).then(|| SeveralTouches::one(contact, 1.0)),
+            ..LiveUpdate::nothing(k * 10_000)
         }
     }
 

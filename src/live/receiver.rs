@@ -1,6 +1,6 @@
 //! Bytes in, samples out, whatever the board speaks.
 
-use crate::wire::{Decoder, Event, Hello, LineReader, Message, Refusal, TextLine, Timeline};
+use crate::wire::{Decoded, Decoder, Hello, LineReader, Refusal, TextLine, Timeline, WireMessage};
 
 /// What was understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +133,7 @@ const FRAMES: usize = 3;
 #[derive(Default)]
 pub struct Receiver {
     frames: Decoder,
-    events: Vec<Event>,
+    events: Vec<Decoded>,
     lines: LineReader,
     speech: Speech,
     rows: usize,
@@ -201,11 +201,11 @@ impl Receiver {
         });
     }
 
-    fn take_event(&mut self, event: Event, tell: &mut impl FnMut(Input)) {
+    fn take_event(&mut self, event: Decoded, tell: &mut impl FnMut(Input)) {
         match event {
-            Event::Lost(count) => self.traffic.lost += u64::from(count),
-            Event::Refused(why) => self.refuse(why),
-            Event::Message {
+            Decoded::Lost(count) => self.traffic.lost += u64::from(count),
+            Decoded::Refused(why) => self.refuse(why),
+            Decoded::Message {
                 time_us, message, ..
             } => self.take_message(time_us, message, tell),
         }
@@ -225,19 +225,19 @@ impl Receiver {
         }
     }
 
-    fn take_message(&mut self, time_us: u32, message: Message, tell: &mut impl FnMut(Input)) {
+    fn take_message(&mut self, time_us: u32, message: WireMessage, tell: &mut impl FnMut(Input)) {
         if message.is_of_studio() {
             // An echo of our own, which lines may well have too.
             return;
         }
         let first = self.speech == Speech::Unknown;
-        self.believe_frames(first || matches!(message, Message::Hello(_)));
+        self.believe_frames(first || matches!(message, WireMessage::Hello(_)));
         if self.speech != Speech::Frames {
             return;
         }
         match message {
-            Message::Hello(hello) => tell(Input::Hello(hello)),
-            Message::Data(counts) => {
+            WireMessage::Hello(hello) => tell(Input::Hello(hello)),
+            WireMessage::Data(counts) => {
                 self.traffic.samples += 1;
                 self.doubt = None;
                 let counts = counts.into_iter().map(f64::from).collect();
@@ -246,17 +246,17 @@ impl Receiver {
                     counts,
                 }));
             }
-            Message::Status { overruns, .. } => self.traffic.overruns = overruns,
-            Message::Log { level, text } => tell(Input::Log {
+            WireMessage::Status { overruns, .. } => self.traffic.overruns = overruns,
+            WireMessage::Log { level, text } => tell(Input::Log {
                 level,
                 text,
                 time_us: self.time.extend(time_us),
             }),
-            Message::Note(text) => tell(Input::Note {
+            WireMessage::Note(text) => tell(Input::Note {
                 text,
                 time_us: self.time.extend(time_us),
             }),
-            Message::Pong(token) => tell(Input::Pong(token)),
+            WireMessage::Pong(token) => tell(Input::Pong(token)),
             _ => {}
         }
     }
@@ -365,7 +365,7 @@ mod tests {
 
     fn greeting(hello: Hello) -> Vec<u8> {
         let mut bytes = vec![0];
-        encode(&Message::Hello(hello), 0, 0, 12, &mut bytes);
+        encode(&WireMessage::Hello(hello), 0, 0, 12, &mut bytes);
         bytes
     }
 
@@ -374,7 +374,7 @@ mod tests {
         for k in from..to {
             let counts = vec![100 + u32::from(k % 9), 200];
             encode(
-                &Message::Data(counts),
+                &WireMessage::Data(counts),
                 k,
                 1000 * u32::from(k),
                 12,
@@ -408,7 +408,7 @@ mod tests {
     #[test]
     fn an_echo_of_the_studio_does_not_hide_lines() {
         let mut bytes = vec![0];
-        encode(&Message::AskHello, 0, 0, 12, &mut bytes);
+        encode(&WireMessage::AskHello, 0, 0, 12, &mut bytes);
         bytes.extend(b"\n1 2\n2 3\n3 4\n4 5\n5 6\n");
         assert_eq!(inputs(&bytes).1.samples, 2);
     }

@@ -1,7 +1,7 @@
 //! What channels read at rest, how much they tremble, and how that drifts.
 
 use super::health::MEDIAN_OF_NORMAL;
-use super::hum::{Hum, Rows};
+use super::hum::{Hum, HumSamples};
 use crate::statistics::{mean, median};
 
 /// Rest of every channel: counts and the standard deviation of their noise.
@@ -84,7 +84,7 @@ impl Taring {
 
 /// Whether all channels stay where they are, or drift steadily: each part of some samples lies on one line with the
 /// others, but for what noise makes of it, and the line is no steeper than a few times `slack` within them.
-fn is_quiet(rows: &Rows, slack: f64) -> bool {
+fn is_quiet(rows: &HumSamples, slack: f64) -> bool {
     let counts: Vec<&[f64]> = rows.iter().map(|r| &r.1[..]).collect();
     let parts: Vec<&[&[f64]]> = counts.chunks(counts.len().div_ceil(PARTS)).collect();
     (0..counts[0].len()).all(|c| {
@@ -104,7 +104,7 @@ fn is_quiet(rows: &Rows, slack: f64) -> bool {
 
 /// As it is at the last of some samples (s, counts). Medians, so that a few wild samples count for nothing; noise from
 /// differences of neighbours, so that a drift counts for nothing, or where that is more from what they scatter by around it.
-fn rest(rows: &Rows) -> Rest {
+fn rest(rows: &HumSamples) -> Rest {
     let lasted = rows.back().map_or(0.0, |r| r.0) - rows.front().map_or(0.0, |r| r.0);
     let counts: Vec<&[f64]> = rows.iter().map(|r| &r.1[..]).collect();
     let mut rest = Rest::default();

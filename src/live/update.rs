@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::inference::{Chain, Contact, Deviations, Errors, Matching, ResponseMap, Touches};
+use crate::inference::{
+    Chain, Contact, Deviations, Matching, ReadingErrors, ResponseMap, SeveralTouches,
+};
 use crate::uncertainty::{UNESTIMATED, Uncertainty};
 
 /// Which estimator is shown.
@@ -45,7 +47,7 @@ pub struct PipelineSettings {
     /// The board's channel of each gauge.
     pub channels: Vec<usize>,
     /// What model and gauges are off by, over the reading, where that is more than the model says of itself; see
-    /// [`Errors::relative`].
+    /// [`ReadingErrors::relative`].
     pub relative: f64,
     /// Noise of a reading below which it is never taken to be (strain).
     pub least_noise: f64,
@@ -84,7 +86,7 @@ pub struct Guess {
 
 /// What one sample said.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Update {
+pub struct LiveUpdate {
     /// The board's clock (µs).
     pub time_us: u64,
     /// Strain of each gauge since the tare; nothing before it.
@@ -92,7 +94,7 @@ pub struct Update {
     /// By matching, while there is a touch: of several the hardest.
     pub contact: Option<Contact>,
     /// All that touch; absent where nothing does, and without a contact where nothing that is known does.
-    pub touches: Option<Touches>,
+    pub touches: Option<SeveralTouches>,
     /// By the trained estimators, where they are trained and there is a touch: normalized, raw, learned from presses.
     pub guesses: [Option<Guess>; 3],
     /// Gauges that are trusted.
@@ -101,7 +103,7 @@ pub struct Update {
     pub blind: Option<f64>,
 }
 
-impl Update {
+impl LiveUpdate {
     /// Before there is a rest, or of a board with too few channels.
     #[must_use]
     pub fn nothing(time_us: u64) -> Self {
@@ -136,7 +138,7 @@ impl Update {
 pub struct GaugeModel {
     /// Readings as the gauges are thought to be glued.
     pub map: Arc<ResponseMap>,
-    /// See [`Errors::deviations`].
+    /// See [`ReadingErrors::deviations`].
     pub deviations: Option<Deviations>,
     /// What else is known to be off. Noise and resolution are read off the signals.
     pub off: Uncertainty,
@@ -157,10 +159,10 @@ impl GaugeModel {
     /// The estimator, with this noise of each channel (strain).
     pub(super) fn matching(self, noise: Vec<f64>, settings: &PipelineSettings) -> Matching {
         let channels = self.map.channels();
-        let errors = Errors {
+        let errors = ReadingErrors {
             noise,
             relative: settings.relative.max(self.off.elements),
-            ..Errors::known(&self.off, channels, self.deviations)
+            ..ReadingErrors::known(&self.off, channels, self.deviations)
         };
         Matching::new(self.map, errors, settings.most_force)
     }

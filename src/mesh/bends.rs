@@ -44,13 +44,13 @@ pub fn bends(
     // `min` leaves out a reach that is not known.
     let reach = reach.min(FARTHEST * (upper - lower).length());
     let angles = dihedrals(mesh);
-    let measured = |near: &mut Near, (facet, area): (u32, f64)| Bend {
+    let measured = |near: &mut NearFacets, (facet, area): (u32, f64)| Bend {
         area,
         curvature: near.curvature(mesh, facet, reach, &sharp),
     };
     places(mesh, facets)
         .into_par_iter()
-        .map_init(|| Near::over(mesh, &angles), measured)
+        .map_init(|| NearFacets::over(mesh, &angles), measured)
         .collect()
 }
 
@@ -102,7 +102,7 @@ fn places(mesh: &TriMesh, facets: &[u32]) -> Vec<(u32, f64)> {
 }
 
 /// The facets around a place, and room to find them in.
-struct Near<'a> {
+struct NearFacets<'a> {
     /// By how much the surface turns at each edge (rad).
     angles: &'a [f64],
     /// The number of the search that met each facet last.
@@ -113,7 +113,7 @@ struct Near<'a> {
     weights: Vec<f64>,
 }
 
-impl<'a> Near<'a> {
+impl<'a> NearFacets<'a> {
     fn over(mesh: &TriMesh, angles: &'a [f64]) -> Self {
         Self {
             angles,
@@ -190,7 +190,7 @@ impl<'a> Near<'a> {
     fn turns(&self, mesh: &TriMesh, ball: &Ball, sharp: &impl Fn(usize) -> bool) -> Matrix3<f64> {
         let mut turns = Matrix3::zeros();
         for &t in &self.facets {
-            for Side {
+            for FacetSide {
                 edge, ends, weight, ..
             } in smooth_sides(mesh, t, ball, sharp)
             {
@@ -240,7 +240,7 @@ fn side(mesh: &TriMesh, facet: u32, corner: usize) -> (DVec3, DVec3) {
 }
 
 /// A side of a facet that reaches into a ball and is not sharp.
-struct Side {
+struct FacetSide {
     edge: usize,
     /// As the facet goes round (m).
     ends: [DVec3; 2],
@@ -256,7 +256,7 @@ fn smooth_sides(
     facet: u32,
     ball: &Ball,
     sharp: &impl Fn(usize) -> bool,
-) -> impl Iterator<Item = Side> {
+) -> impl Iterator<Item = FacetSide> {
     let edges = mesh.triangle_edges()[facet as usize];
     (0..3).filter_map(move |corner| {
         let edge = edges[corner] as usize;
@@ -268,7 +268,7 @@ fn smooth_sides(
         }
         let (from, to) = side(mesh, facet, corner);
         let weight = ball.of_edge(from, to);
-        (weight > 0.0).then_some(Side {
+        (weight > 0.0).then_some(FacetSide {
             edge,
             ends: [from, to],
             beyond: if s == facet { t } else { s },

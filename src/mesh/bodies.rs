@@ -11,7 +11,7 @@ use super::{MeshError, winding};
 use crate::bounds::Bounds;
 
 /// One body of several.
-pub(super) struct Kept {
+pub(super) struct KeptBody {
     pub(super) positions: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// Of each vertex of the whole.
@@ -24,7 +24,7 @@ pub(super) fn keep_body(
     triangles: &[[u32; 3]],
     body: usize,
     report: &mut RepairReport,
-) -> Result<Kept, MeshError> {
+) -> Result<KeptBody, MeshError> {
     let labels = components(positions.len(), triangles);
     let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
     for tri in triangles {
@@ -61,7 +61,7 @@ pub(super) fn keep_body(
         *tri = tri.map(|v| renumber[v as usize]);
     }
     let numbers = renumber.into_iter().zip(used);
-    Ok(Kept {
+    Ok(KeptBody {
         positions: kept,
         triangles: chosen,
         numbers: numbers.map(|(v, used)| used.then_some(v)).collect(),

@@ -20,7 +20,7 @@ pub const ON_PLANE: f64 = 1e-4;
 pub fn cut_by_boxes(mesh: &TriMesh, boxes: &[OrientedBox]) -> (TriMesh, Vec<(u32, u32, f64)>) {
     let (lower, upper) = mesh.bounds();
     let slack = ON_PLANE * (upper - lower).length();
-    let mut cut = Cutter {
+    let mut cut = MeshCutter {
         positions: mesh.positions().to_vec(),
         triangles: mesh.triangles().to_vec(),
         parents: Vec::new(),
@@ -39,7 +39,7 @@ pub fn cut_by_boxes(mesh: &TriMesh, boxes: &[OrientedBox]) -> (TriMesh, Vec<(u32
     )
 }
 
-struct Cutter {
+struct MeshCutter {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     parents: Vec<(u32, u32, f64)>,
@@ -48,7 +48,7 @@ struct Cutter {
     slack: f64,
 }
 
-impl Cutter {
+impl MeshCutter {
     fn by_box(&mut self, region: &OrientedBox) {
         let places = self.positions.iter();
         self.places = places.map(|&p| region.stance.coordinates(p)).collect();

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::locate::SurfaceIndex;
 use super::stance::Stance;
-use super::stretch::{Seen, Stretch};
+use super::stretch::{SeenFacets, Stretch};
 use super::unroll::Unrolling;
 use super::{SurfacePoint, TriMesh};
 
@@ -46,7 +46,7 @@ impl Flat {
     pub fn of(mesh: &TriMesh, stance: Stance) -> Self {
         let mut rule = rule(mesh, stance);
         let flat = Self::by(rule, mesh);
-        let seen = Seen::of(mesh, &flat.positions, &flat.triangles, &flat.index);
+        let seen = SeenFacets::of(mesh, &flat.positions, &flat.triangles, &flat.index);
         let factor = match &mut rule {
             Rule::Tube(unrolling) => {
                 let factor = seen.best_factor();

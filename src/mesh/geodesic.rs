@@ -108,12 +108,12 @@ impl Waves {
 }
 
 #[derive(PartialEq)]
-struct Entry {
+struct QueueEntry {
     distance: f64,
     vertex: u32,
 }
-impl Eq for Entry {}
-impl Ord for Entry {
+impl Eq for QueueEntry {}
+impl Ord for QueueEntry {
     // Reversed, so that the heap gives the nearest first; ties by index keep the order fixed.
     fn cmp(&self, other: &Self) -> Ordering {
         other
@@ -122,7 +122,7 @@ impl Ord for Entry {
             .then(other.vertex.cmp(&self.vertex))
     }
 }
-impl PartialOrd for Entry {
+impl PartialOrd for QueueEntry {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
@@ -137,14 +137,14 @@ fn seeds(mesh: &TriMesh, source: SurfacePoint) -> [(u32, f64); 3] {
 
 /// What a march needs to remember, kept between marches that stay small.
 #[derive(Default)]
-pub struct Scratch {
+pub struct MarchScratch {
     waves: Waves,
     settled: Vec<bool>,
     /// Vertices that hold anything of the last march.
     reached: Vec<u32>,
 }
 
-impl Scratch {
+impl MarchScratch {
     fn fit(&mut self, vertices: usize) {
         self.waves.distance.resize(vertices, f64::INFINITY);
         self.waves.bend.resize(vertices, None);
@@ -212,7 +212,7 @@ impl March {
         mesh: &TriMesh,
         source: SurfacePoint,
         limit: f64,
-        scratch: &mut Scratch,
+        scratch: &mut MarchScratch,
     ) -> Vec<(u32, f64)> {
         scratch.fit(self.helps.len());
         self.march(scratch, &seeds(mesh, source), limit, Front::Circular);
@@ -225,10 +225,10 @@ impl March {
     }
 
     fn run(&self, seeds: &[(u32, f64)], limit: f64, front: Front) -> Waves {
-        let mut scratch = Scratch::default();
+        let mut scratch = MarchScratch::default();
         scratch.fit(self.helps.len());
         self.march(&mut scratch, seeds, limit, front);
-        let Scratch {
+        let MarchScratch {
             mut waves, settled, ..
         } = scratch;
         for (d, done) in waves.distance.iter_mut().zip(&settled) {
@@ -239,17 +239,17 @@ impl March {
         waves
     }
 
-    fn march(&self, scratch: &mut Scratch, seeds: &[(u32, f64)], limit: f64, front: Front) {
+    fn march(&self, scratch: &mut MarchScratch, seeds: &[(u32, f64)], limit: f64, front: Front) {
         /// Less than this share is no shorter way.
         const SHORTER: f64 = 1e-9;
         let mut heap = BinaryHeap::new();
         for &(vertex, distance) in seeds {
             if distance < scratch.waves.distance[vertex as usize] {
                 scratch.reach(vertex, distance, None);
-                heap.push(Entry { distance, vertex });
+                heap.push(QueueEntry { distance, vertex });
             }
         }
-        while let Some(Entry { distance, vertex }) = heap.pop() {
+        while let Some(QueueEntry { distance, vertex }) = heap.pop() {
             if scratch.settled[vertex as usize] || distance > limit {
                 continue;
             }
@@ -262,7 +262,7 @@ impl March {
                 if reach < scratch.waves.distance[target] * (1.0 - SHORTER) && reach <= limit {
                     scratch.reach(help.target, reach, bend);
                     scratch.settled[target] = false;
-                    heap.push(Entry {
+                    heap.push(QueueEntry {
                         distance: reach,
                         vertex: help.target,
                     });

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::TriMesh;
 use super::locate::SurfaceIndex;
 use super::mount::Mount;
-use super::walls::{Side, Walls, frame, middle};
+use super::walls::{WallSide, Walls, frame, middle};
 use crate::budget::{Cancelled, Watch, report};
 
 /// Radius of a fingertip (m).
@@ -169,8 +169,8 @@ impl Reach {
             let facets = (0u32..mesh.triangles().len() as u32).filter(|&t| of(t as usize));
             facets.map(|t| mesh.facet_area(t)).sum()
         };
-        let is = |side: Side| area(&|t| walls.sides[t] == side).max(f64::MIN_POSITIVE);
-        let (outward, inward) = (is(Side::Outside), is(Side::Inside));
+        let is = |side: WallSide| area(&|t| walls.sides[t] == side).max(f64::MIN_POSITIVE);
+        let (outward, inward) = (is(WallSide::Outside), is(WallSide::Inside));
         let reached = area(&|t| touched[t]);
         let own = walls.thickness.iter().zip(&touched);
         let own: Vec<f64> = own.map(|(&w, &t)| if t { w } else { f64::NAN }).collect();
@@ -182,7 +182,7 @@ impl Reach {
         let mut backs = backs(walls, &touched, THICK * usual);
         let walled = area(&|t| backs[t]) > WALLED * inward;
         if !walled {
-            backs = walls.sides.iter().map(|&s| s == Side::Inside).collect();
+            backs = walls.sides.iter().map(|&s| s == WallSide::Inside).collect();
         }
         Ok(Self {
             unreached: 1.0 - reached / outward,
@@ -195,19 +195,19 @@ impl Reach {
     }
 
     /// Takes what the user says of a facet for what was found.
-    pub fn tell(&mut self, t: u32, side: Side) {
-        self.touched[t as usize] = side == Side::Outside;
-        self.backs[t as usize] = side == Side::Inside;
+    pub fn tell(&mut self, t: u32, side: WallSide) {
+        self.touched[t as usize] = side == WallSide::Outside;
+        self.backs[t as usize] = side == WallSide::Inside;
     }
 
     /// Sides of facets, without the faces that are of no use.
     #[must_use]
-    pub fn sides(&self, sides: &[Side]) -> Vec<Side> {
+    pub fn sides(&self, sides: &[WallSide]) -> Vec<WallSide> {
         let facets = sides.iter().zip(self.touched.iter().zip(&self.backs));
         facets
             .map(|(&side, (touched, back))| match side {
-                Side::Outside if !touched => Side::Frame,
-                Side::Inside if !back => Side::Frame,
+                WallSide::Outside if !touched => WallSide::Frame,
+                WallSide::Inside if !back => WallSide::Frame,
                 _ => side,
             })
             .collect()
@@ -253,7 +253,7 @@ fn reached(
     let all: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
     let is_reached = |&t: &u32| {
         let middle = mesh.corners(t).iter().sum::<DVec3>() / 3.0;
-        walls.sides[t as usize] == Side::Outside && finger.reaches(middle, mesh.facet_normal(t))
+        walls.sides[t as usize] == WallSide::Outside && finger.reaches(middle, mesh.facet_normal(t))
     };
     let mut touched: Vec<bool> = Vec::with_capacity(all.len());
     for chunk in all.chunks(CHUNK) {
@@ -279,7 +279,7 @@ fn beside(mesh: &TriMesh, t: u32) -> impl Iterator<Item = u32> {
 fn fill(mesh: &TriMesh, walls: &Walls, touched: &mut [bool]) {
     let old = touched.to_vec();
     for (t, touched) in (0u32..).zip(touched) {
-        if *touched || walls.sides[t as usize] != Side::Outside {
+        if *touched || walls.sides[t as usize] != WallSide::Outside {
             continue;
         }
         let mut around = beside(mesh, t).map(|o| old[o as usize]).peekable();
@@ -329,7 +329,7 @@ fn backs(walls: &Walls, touched: &[bool], thick: f64) -> Vec<bool> {
     let facets = walls.sides.iter().zip(&walls.thickness).zip(&walls.facing);
     facets
         .map(|((&side, &thickness), facing)| {
-            side == Side::Inside
+            side == WallSide::Inside
                 && thickness <= thick
                 && facing.is_some_and(|front| touched[front as usize])
         })

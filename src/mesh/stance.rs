@@ -21,7 +21,7 @@ impl Stance {
     /// The end with the larger coordinate is up.
     #[must_use]
     pub fn of(mesh: &TriMesh) -> Self {
-        Self::about(Moments::of(mesh).axis())
+        Self::about(SurfaceMoments::of(mesh).axis())
     }
 
     /// With a given direction up, of any length. The front of a part that stands along z is x, and so on around.
@@ -99,14 +99,14 @@ impl Direction {
 }
 
 /// Means over a surface.
-struct Moments {
+struct SurfaceMoments {
     /// Of n nᵀ: along a direction, how much the surface faces it.
     facing: Matrix3<f64>,
     /// Of r rᵀ about the middle, in parts of the size: along a direction, its spread squared.
     spread: Matrix3<f64>,
 }
 
-impl Moments {
+impl SurfaceMoments {
     fn of(mesh: &TriMesh) -> Self {
         let (lower, upper) = mesh.bounds();
         let (middle, size) = ((lower + upper) / 2.0, (upper - lower).max_element());

@@ -37,13 +37,13 @@ impl Stretch {
 }
 
 /// The facets that are seen of a part laid flat, as they are in space and in the plane.
-pub(super) struct Seen {
-    facets: Vec<Facet>,
+pub(super) struct SeenFacets {
+    facets: Vec<StretchFacet>,
     /// Of the part.
     count: usize,
 }
 
-struct Facet {
+struct StretchFacet {
     number: usize,
     /// In the plane (m²).
     area: f64,
@@ -56,7 +56,7 @@ struct Facet {
 /// aa, ab, bb of two sides a and b (m²).
 type Gram = [f64; 3];
 
-impl Seen {
+impl SeenFacets {
     /// Of a part, the triangles that a flat view (`positions`, which rise towards the eye) is seen to have on top.
     pub fn of(
         mesh: &TriMesh,
@@ -68,9 +68,10 @@ impl Seen {
         let facet = |(number, tri): (usize, &[u32; 3])| {
             let flat = tri.map(|v| positions[v as usize]);
             is_on_top(number as u32, flat, high, index)
-                .then(|| Facet::of(number, mesh.corners(number as u32), flat))
+                .then(|| StretchFacet::of(number, mesh.corners(number as u32), flat))
         };
-        let facets: Vec<Option<Facet>> = triangles.par_iter().enumerate().map(facet).collect();
+        let facets: Vec<Option<StretchFacet>> =
+            triangles.par_iter().enumerate().map(facet).collect();
         Self {
             facets: facets.into_iter().flatten().collect(),
             count: triangles.len(),
@@ -109,7 +110,7 @@ impl Seen {
         for facet in &self.facets {
             facets[facet.number] = facet.departure(factor);
         }
-        let mut order: Vec<&Facet> = self.facets.iter().collect();
+        let mut order: Vec<&StretchFacet> = self.facets.iter().collect();
         order.sort_by(|a, b| facets[a.number].total_cmp(&facets[b.number]));
         let all: f64 = order.iter().map(|f| f.area).sum();
         let mut below = 0.0;
@@ -134,7 +135,7 @@ fn is_on_top(number: u32, flat: [DVec3; 3], high: f64, index: &SurfaceIndex) -> 
     (index.ray(eye, DVec3::NEG_Z)).is_some_and(|(at, _)| at.triangle == number)
 }
 
-impl Facet {
+impl StretchFacet {
     fn of(number: usize, [a, b, c]: [DVec3; 3], flat: [DVec3; 3]) -> Self {
         let [p, q, r] = flat.map(DVec3::truncate);
         let (u, v): (DVec2, DVec2) = (q - p, r - p);

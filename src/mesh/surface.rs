@@ -40,12 +40,12 @@ pub struct Surface {
     pub features: Vec<bool>,
     /// For each vertex of the part.
     pub mobility: Vec<Mobility>,
-    lines: Option<Lines>,
+    lines: Option<FeatureLines>,
     /// Normals at the corners of each facet, not averaged across creases.
     normals: Vec<[DVec3; 3]>,
 }
 
-struct Lines {
+struct FeatureLines {
     tree: Polyline,
     /// Edge of the part that each segment is.
     edges: Vec<u32>,
@@ -84,7 +84,7 @@ impl Surface {
             .collect();
         Self {
             mobility: mobility(mesh, &features, spot),
-            lines: Lines::new(mesh, &features),
+            lines: FeatureLines::new(mesh, &features),
             normals: corner_normals(mesh, &facet_normals),
             features,
             mesh: Arc::clone(mesh),
@@ -159,7 +159,7 @@ impl Surface {
     }
 }
 
-impl Lines {
+impl FeatureLines {
     fn new(mesh: &TriMesh, features: &[bool]) -> Option<Self> {
         let edges: Vec<u32> = (0..features.len() as u32)
             .filter(|&e| features[e as usize])

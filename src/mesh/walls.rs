@@ -14,7 +14,7 @@ use crate::budget::{Cancelled, Watch, report};
 /// Which side of its wall a facet is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Side {
+pub enum WallSide {
     /// Where touches land.
     Outside,
     /// Where gauges go.
@@ -29,7 +29,7 @@ pub enum Side {
 #[derive(Clone, Debug)]
 pub struct Walls {
     /// The side that each facet is on.
-    pub sides: Vec<Side>,
+    pub sides: Vec<WallSide>,
     /// Through the material to the facing surface (m); NaN where there is none.
     pub thickness: Vec<f64>,
     /// Through the open to a facing surface (m); infinite where there is none.
@@ -59,10 +59,10 @@ impl Walls {
         const CHUNK: usize = 512;
         let looks = looks();
         let all: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
-        let mut facets: Vec<Facet> = Vec::with_capacity(all.len());
+        let mut facets: Vec<FacetSight> = Vec::with_capacity(all.len());
         for chunk in all.chunks(CHUNK) {
             report(watch, "Measuring walls", facets.len(), all.len())?;
-            facets.par_extend(chunk.par_iter().map(|&t| Facet::of(mesh, t, &looks)));
+            facets.par_extend(chunk.par_iter().map(|&t| FacetSight::of(mesh, t, &looks)));
         }
         let thickness: Vec<f64> = facets.iter().map(|f| f.thickness).collect();
         let typical = middle(&thickness, mesh);
@@ -113,7 +113,7 @@ impl Walls {
                 let flat = mesh.facet_normal(*other).dot(mesh.facet_normal(t as u32)) > 0.7;
                 (all.len() == 2 && flat).then(|| old[*other as usize])
             };
-            let votes: Vec<Side> = edges.iter().filter_map(|&e| beside(e)).collect();
+            let votes: Vec<WallSide> = edges.iter().filter_map(|&e| beside(e)).collect();
             let other = votes.iter().find(|&&s| s != old[t]);
             if let Some(&other) = other
                 && votes.iter().filter(|&&s| s == other).count() >= 2
@@ -125,7 +125,7 @@ impl Walls {
 }
 
 /// What one facet sees.
-struct Facet {
+struct FacetSight {
     /// Share of the open that it sees, and that the facet behind its wall sees.
     open: f64,
     open_behind: f64,
@@ -139,7 +139,7 @@ struct Facet {
     facing: Option<u32>,
 }
 
-impl Facet {
+impl FacetSight {
     fn of(mesh: &TriMesh, t: u32, looks: &[DVec3]) -> Self {
         let index = mesh.index();
         let (lower, upper) = mesh.bounds();
@@ -179,10 +179,10 @@ impl Facet {
         }
     }
 
-    fn side(&self, mesh: &TriMesh, t: u32, typical: f64) -> Side {
+    fn side(&self, mesh: &TriMesh, t: u32, typical: f64) -> WallSide {
         let deep = self.thickness.is_nan() || self.thickness > END * typical;
         if deep && self.beside < typical {
-            return Side::Rim;
+            return WallSide::Rim;
         }
         let more = if self.thickness.is_nan() {
             self.open - 0.5
@@ -191,9 +191,9 @@ impl Facet {
         };
         if more.abs() > ALIKE {
             return if more > 0.0 {
-                Side::Outside
+                WallSide::Outside
             } else {
-                Side::Inside
+                WallSide::Inside
             };
         }
         // A flat plate looks the same from both sides: what faces up is taken for the outside.
@@ -204,9 +204,9 @@ impl Facet {
             .find(|c| c.abs() > 0.5)
             .unwrap_or(normal.z);
         if up >= 0.0 {
-            Side::Outside
+            WallSide::Outside
         } else {
-            Side::Inside
+            WallSide::Inside
         }
     }
 }
@@ -278,9 +278,9 @@ mod tests {
             let middle = solid.corners(t).iter().sum::<DVec3>() / 3.0;
             let radial = solid.facet_normal(t).dot(middle.with_z(0.0).normalize());
             let truth = match radial {
-                r if r > 0.9 => Side::Outside,
-                r if r < -0.9 => Side::Inside,
-                _ => Side::Rim,
+                r if r > 0.9 => WallSide::Outside,
+                r if r < -0.9 => WallSide::Inside,
+                _ => WallSide::Rim,
             };
             let area = solid.facet_area(t);
             found[*side as usize] += area;

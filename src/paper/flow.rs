@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-use super::sheet::{Align, Format, Ink, Line, Sheet, Words};
-use super::text::{Face, width_mm, wrapped};
+use super::sheet::{Align, Ink, PlacedWords, Sheet, SheetLine, SheetSize};
+use super::text::{Typeface, width_mm, wrapped};
 
 const MARGIN: f64 = 18.0;
 /// Above and below what is printed, the foot included.
@@ -21,7 +21,7 @@ const GAP: f64 = 3.0;
 
 /// Sheets that are being filled.
 pub struct Flow {
-    format: Format,
+    format: SheetSize,
     sheets: Vec<Sheet>,
     /// Below what is printed on the last sheet (mm).
     y: f64,
@@ -30,7 +30,7 @@ pub struct Flow {
 impl Flow {
     /// Begins with an empty sheet.
     #[must_use]
-    pub fn new(format: Format) -> Self {
+    pub fn new(format: SheetSize) -> Self {
         Self {
             format,
             sheets: vec![Sheet::new(format)],
@@ -86,7 +86,7 @@ impl Flow {
 
     /// The document's name.
     pub fn title(&mut self, text: &str) {
-        self.lines(text, 6.4, Face::Text, INK, 0.0);
+        self.lines(text, 6.4, Typeface::Text, INK, 0.0);
         self.skip(1.5);
     }
 
@@ -97,22 +97,22 @@ impl Flow {
         if self.y > EDGE {
             self.skip(5.0);
         }
-        self.lines(text, 4.6, Face::Text, INK, 0.0);
+        self.lines(text, 4.6, Typeface::Text, INK, 0.0);
         let (y, width) = (self.y - 0.6, self.width());
         let rule = [DVec2::new(MARGIN, y), DVec2::new(MARGIN + width, y)];
-        self.sheet().line(rule, Line::new(RULE, 0.3));
+        self.sheet().line(rule, SheetLine::new(RULE, 0.3));
         self.skip(2.0);
     }
 
     /// Text.
     pub fn text(&mut self, text: &str) {
-        self.lines(text, TEXT, Face::Text, INK, 0.0);
+        self.lines(text, TEXT, Typeface::Text, INK, 0.0);
         self.skip(1.2);
     }
 
     /// Text that is less than other text.
     pub fn note(&mut self, text: &str) {
-        self.lines(text, SMALL, Face::Text, PALE, 0.0);
+        self.lines(text, SMALL, Typeface::Text, PALE, 0.0);
         self.skip(1.0);
     }
 
@@ -122,15 +122,15 @@ impl Flow {
         self.need(TEXT * LINE);
         let at = DVec2::new(MARGIN + 1.0, self.y + TEXT);
         self.sheet().say(at, mark, TEXT, Align::Left);
-        self.lines(text, TEXT, Face::Text, INK, IN);
+        self.lines(text, TEXT, Typeface::Text, INK, IN);
         self.skip(0.8);
     }
 
-    fn lines(&mut self, text: &str, size: f64, face: Face, ink: Ink, indent: f64) {
+    fn lines(&mut self, text: &str, size: f64, face: Typeface, ink: Ink, indent: f64) {
         for line in wrapped(text, size, face, self.width() - indent) {
             self.need(size * LINE);
             let at = DVec2::new(MARGIN + indent, self.y + size);
-            self.sheet().words(Words {
+            self.sheet().words(PlacedWords {
                 at,
                 text: line,
                 size,
@@ -167,7 +167,7 @@ impl Flow {
     }
 
     fn widths(&self, names: &[&str], rows: &[Vec<String>]) -> Vec<f64> {
-        let width = |text: &str| width_mm(text, SMALL, Face::Text);
+        let width = |text: &str| width_mm(text, SMALL, Typeface::Text);
         // A name may stand on two lines.
         let name = |text: &str| {
             text.split_whitespace()
@@ -195,7 +195,7 @@ impl Flow {
 
     fn row(&mut self, cells: &[String], columns: &[(f64, Align)], ink: Ink, keep: usize) {
         let broken: Vec<Vec<String>> = (cells.iter().zip(columns))
-            .map(|(cell, (width, _))| wrapped(cell, SMALL, Face::Text, *width))
+            .map(|(cell, (width, _))| wrapped(cell, SMALL, Typeface::Text, *width))
             .collect();
         let lines = broken.iter().map(Vec::len).max().unwrap_or(1);
         let height = SMALL * LINE * lines as f64 + 1.0;
@@ -207,11 +207,11 @@ impl Flow {
             let at = if align == Align::Right { x + w } else { x };
             for (n, text) in lines.iter().enumerate() {
                 let y = top + SMALL * (1.0 + LINE * n as f64);
-                self.sheet().words(Words {
+                self.sheet().words(PlacedWords {
                     at: DVec2::new(at, y),
                     text: text.clone(),
                     size: SMALL,
-                    face: Face::Text,
+                    face: Typeface::Text,
                     ink,
                     align,
                 });
@@ -221,7 +221,7 @@ impl Flow {
         self.y = top + height;
         let y = self.y - 0.3;
         let rule = [DVec2::new(MARGIN, y), DVec2::new(MARGIN + width, y)];
-        self.sheet().line(rule, Line::new(RULE, 0.15));
+        self.sheet().line(rule, SheetLine::new(RULE, 0.15));
         self.skip(0.4);
     }
 
@@ -237,11 +237,11 @@ impl Flow {
                 (size.x - MARGIN, page.as_str(), Align::Right),
             ];
             for (x, text, align) in ends {
-                sheet.words(Words {
+                sheet.words(PlacedWords {
                     at: DVec2::new(x, y),
                     text: text.to_owned(),
                     size: SMALL,
-                    face: Face::Text,
+                    face: Typeface::Text,
                     ink: PALE,
                     align,
                 });
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn what_is_long_goes_over_several_sheets_and_nothing_is_printed_over() {
-        for format in [Format::A4, Format::Letter] {
+        for format in [SheetSize::A4, SheetSize::Letter] {
             let mut flow = Flow::new(format);
             flow.title("A title that is so long that it certainly does not stand on one line of a sheet of paper");
             for k in 0..30 {

@@ -10,8 +10,8 @@ use krilla::paint::{Fill, LineCap, LineJoin, Stroke, StrokeDash};
 use krilla::surface::Surface;
 use krilla::text::{Font, GlyphId, KrillaGlyph};
 
-use super::sheet::{Align, Ink, Item, Line, Sheet, Words};
-use super::text::{Face, letters};
+use super::sheet::{Align, Ink, Item, PlacedWords, Sheet, SheetLine};
+use super::text::{Typeface, letters};
 
 /// Points of PDF in a millimetre.
 const POINTS: f64 = 72.0 / 25.4;
@@ -28,8 +28,8 @@ pub fn pdf(title: &str, sheets: &[Sheet]) -> Result<Vec<u8>, String> {
             .language("en".into()),
     );
     let font =
-        |face: Face| Font::new(face.bytes().to_vec().into(), 0).ok_or("a typeface is damaged");
-    let fonts = (font(Face::Text)?, font(Face::Fixed)?);
+        |face: Typeface| Font::new(face.bytes().to_vec().into(), 0).ok_or("a typeface is damaged");
+    let fonts = (font(Typeface::Text)?, font(Typeface::Fixed)?);
     for sheet in sheets {
         let settings = PageSettings::from_wh(points(sheet.size.x), points(sheet.size.y));
         let mut page = document.start_page_with(settings.ok_or("a sheet has no size")?);
@@ -48,8 +48,8 @@ pub fn pdf(title: &str, sheets: &[Sheet]) -> Result<Vec<u8>, String> {
                 }
                 Item::Words(words) => {
                     let font = match words.face {
-                        Face::Text => &fonts.0,
-                        Face::Fixed => &fonts.1,
+                        Typeface::Text => &fonts.0,
+                        Typeface::Fixed => &fonts.1,
                     };
                     write(&mut surface, words, font);
                 }
@@ -85,7 +85,7 @@ fn path(corners: &[glam::DVec2], closed: bool) -> Option<Path> {
     builder.finish()
 }
 
-fn draw(surface: &mut Surface<'_>, path: &Path, fill: Option<Ink>, line: Option<Line>) {
+fn draw(surface: &mut Surface<'_>, path: &Path, fill: Option<Ink>, line: Option<SheetLine>) {
     surface.set_fill(fill.map(|ink| Fill {
         paint: paint(ink).into(),
         ..Fill::default()
@@ -105,7 +105,7 @@ fn draw(surface: &mut Surface<'_>, path: &Path, fill: Option<Ink>, line: Option<
     surface.draw_path(path);
 }
 
-fn write(surface: &mut Surface<'_>, words: &Words, font: &Font) {
+fn write(surface: &mut Surface<'_>, words: &PlacedWords, font: &Font) {
     let letters = letters(&words.text, words.face);
     let width = letters.iter().map(|l| l.advance).sum::<f64>() * words.size;
     let back = match words.align {
@@ -143,17 +143,17 @@ fn write(surface: &mut Surface<'_>, words: &Words, font: &Font) {
 mod tests {
     use glam::DVec2;
 
-    use super::super::sheet::Format;
+    use super::super::sheet::SheetSize;
     use super::*;
 
     #[test]
     fn the_same_sheets_are_the_same_bytes() {
-        let mut sheet = Sheet::new(Format::A4);
+        let mut sheet = Sheet::new(SheetSize::A4);
         sheet.circle(
             DVec2::new(50.0, 50.0),
             20.0,
             Some([1, 2, 3]),
-            Some(Line::new([0; 3], 0.3)),
+            Some(SheetLine::new([0; 3], 0.3)),
         );
         sheet.say(
             DVec2::new(20.0, 20.0),

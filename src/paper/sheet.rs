@@ -4,11 +4,11 @@ use std::str::FromStr;
 
 use glam::{DVec2, Vec2Swizzles as _};
 
-use super::text::{Face, width_mm};
+use super::text::{Typeface, width_mm};
 
 /// Sizes of sheets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Format {
+pub enum SheetSize {
     /// 210 × 297 mm.
     #[default]
     A4,
@@ -16,7 +16,7 @@ pub enum Format {
     Letter,
 }
 
-impl Format {
+impl SheetSize {
     /// Width and height (mm).
     #[must_use]
     pub fn size(self) -> DVec2 {
@@ -27,7 +27,7 @@ impl Format {
     }
 }
 
-impl FromStr for Format {
+impl FromStr for SheetSize {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -44,7 +44,7 @@ pub type Ink = [u8; 3];
 
 /// How a line is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
+pub struct SheetLine {
     /// Its colour.
     pub ink: Ink,
     /// mm.
@@ -53,7 +53,7 @@ pub struct Line {
     pub dash: Option<[f64; 2]>,
 }
 
-impl Line {
+impl SheetLine {
     /// A whole line.
     #[must_use]
     pub const fn new(ink: Ink, width: f64) -> Self {
@@ -75,7 +75,7 @@ pub enum Align {
 
 /// Words on one line.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Words {
+pub struct PlacedWords {
     /// Of their base line (mm).
     pub at: DVec2,
     /// What they say.
@@ -83,7 +83,7 @@ pub struct Words {
     /// Height of the type (mm).
     pub size: f64,
     /// Their typeface.
-    pub face: Face,
+    pub face: Typeface,
     /// Their colour.
     pub ink: Ink,
     /// How they stand about their place.
@@ -102,10 +102,10 @@ pub enum Item {
         /// What is inside.
         fill: Option<Ink>,
         /// Along it.
-        line: Option<Line>,
+        line: Option<SheetLine>,
     },
     /// Words.
-    Words(Words),
+    Words(PlacedWords),
 }
 
 /// A sheet of paper: places are millimetres from its upper left corner, to the right and down.
@@ -120,7 +120,7 @@ pub struct Sheet {
 impl Sheet {
     /// An empty one.
     #[must_use]
-    pub fn new(format: Format) -> Self {
+    pub fn new(format: SheetSize) -> Self {
         Self {
             size: format.size(),
             items: Vec::new(),
@@ -129,7 +129,7 @@ impl Sheet {
 
     /// An empty one that lies on its side.
     #[must_use]
-    pub fn lying(format: Format) -> Self {
+    pub fn lying(format: SheetSize) -> Self {
         Self {
             size: format.size().yx(),
             items: Vec::new(),
@@ -137,7 +137,7 @@ impl Sheet {
     }
 
     /// A line through points.
-    pub fn line(&mut self, points: impl IntoIterator<Item = DVec2>, line: Line) {
+    pub fn line(&mut self, points: impl IntoIterator<Item = DVec2>, line: SheetLine) {
         self.items.push(Item::Path {
             points: points.into_iter().collect(),
             closed: false,
@@ -151,7 +151,7 @@ impl Sheet {
         &mut self,
         points: impl IntoIterator<Item = DVec2>,
         fill: Option<Ink>,
-        line: Option<Line>,
+        line: Option<SheetLine>,
     ) {
         self.items.push(Item::Path {
             points: points.into_iter().collect(),
@@ -162,7 +162,7 @@ impl Sheet {
     }
 
     /// A circle, as a polygon that is within a hundredth of a millimetre of one.
-    pub fn circle(&mut self, at: DVec2, radius: f64, fill: Option<Ink>, line: Option<Line>) {
+    pub fn circle(&mut self, at: DVec2, radius: f64, fill: Option<Ink>, line: Option<SheetLine>) {
         const OFF: f64 = 0.01;
         let sides = (std::f64::consts::PI / (2.0 * OFF / radius.max(OFF)).sqrt()).ceil();
         let sides = sides.clamp(12.0, 360.0) as usize;
@@ -173,7 +173,7 @@ impl Sheet {
     }
 
     /// Words; where they end (mm from the left).
-    pub fn words(&mut self, words: Words) -> f64 {
+    pub fn words(&mut self, words: PlacedWords) -> f64 {
         let end = words.at.x + width_mm(&words.text, words.size, words.face);
         self.items.push(Item::Words(words));
         end
@@ -181,11 +181,11 @@ impl Sheet {
 
     /// Plain words from a place on.
     pub fn say(&mut self, at: DVec2, text: &str, size: f64, align: Align) {
-        self.words(Words {
+        self.words(PlacedWords {
             at,
             text: text.to_owned(),
             size,
-            face: Face::Text,
+            face: Typeface::Text,
             ink: [0x1d, 0x24, 0x30],
             align,
         });
@@ -198,14 +198,14 @@ mod tests {
 
     #[test]
     fn a_circle_is_round_to_a_hundredth() {
-        let mut sheet = Sheet::new(Format::A4);
+        let mut sheet = Sheet::new(SheetSize::A4);
         sheet.circle(DVec2::new(50.0, 50.0), 20.0, None, None);
         let Item::Path { points, .. } = &sheet.items[0] else {
             panic!()
         };
         let middle = (points[0] + points[1]) / 2.0;
         assert!(middle.distance(DVec2::splat(50.0)) > 20.0 - 0.011);
-        assert_eq!("Letter".parse::<Format>(), Ok(Format::Letter));
-        assert!("a3".parse::<Format>().is_err());
+        assert_eq!("Letter".parse::<SheetSize>(), Ok(SheetSize::Letter));
+        assert!("a3".parse::<SheetSize>().is_err());
     }
 }

@@ -5,14 +5,14 @@ use skrifa::{FontRef, GlyphId, MetadataProvider as _};
 
 /// A typeface; both come with the window's toolkit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Face {
+pub enum Typeface {
     /// For reading.
     Text,
     /// For numbers and names in columns.
     Fixed,
 }
 
-impl Face {
+impl Typeface {
     /// The font's file.
     #[must_use]
     pub fn bytes(self) -> &'static [u8] {
@@ -33,7 +33,7 @@ pub(super) struct Letter {
 }
 
 /// The letters of a text; what the face does not have is a question mark.
-pub(super) fn letters(text: &str, face: Face) -> Vec<Letter> {
+pub(super) fn letters(text: &str, face: Typeface) -> Vec<Letter> {
     let Ok(font) = FontRef::new(face.bytes()) else {
         return Vec::new();
     };
@@ -59,13 +59,13 @@ pub(super) fn letters(text: &str, face: Face) -> Vec<Letter> {
 
 /// How wide a text is (mm), at a height of the type (mm).
 #[must_use]
-pub fn width_mm(text: &str, size: f64, face: Face) -> f64 {
+pub fn width_mm(text: &str, size: f64, face: Typeface) -> f64 {
     letters(text, face).iter().map(|l| l.advance).sum::<f64>() * size
 }
 
 /// A text in lines that are no wider than `width` (mm); what has no space to break at is broken where it must be.
 #[must_use]
-pub fn wrapped(text: &str, size: f64, face: Face, width: f64) -> Vec<String> {
+pub fn wrapped(text: &str, size: f64, face: Typeface, width: f64) -> Vec<String> {
     let fits = |line: &str| width_mm(line, size, face) <= width;
     let (mut lines, mut open) = (Vec::new(), String::new());
     for word in text.split_whitespace() {
@@ -99,13 +99,17 @@ mod tests {
     #[test]
     fn lines_are_as_wide_as_they_may_be_and_lose_no_word() {
         let text = "Gauges are glued to the inside; avery.long/path-without-any-space-in-it-at-all ends µε 20 °C";
-        let lines = wrapped(text, 4.0, Face::Text, 40.0);
+        let lines = wrapped(text, 4.0, Typeface::Text, 40.0);
         assert!(lines.len() > 3);
-        assert!(lines.iter().all(|l| width_mm(l, 4.0, Face::Text) <= 40.0));
+        assert!(
+            lines
+                .iter()
+                .all(|l| width_mm(l, 4.0, Typeface::Text) <= 40.0)
+        );
         let letters = |t: &str| t.chars().filter(|c| !c.is_whitespace()).collect::<String>();
         assert_eq!(letters(&lines.concat()), letters(text));
-        let fixed = |t: &str| width_mm(t, 3.0, Face::Fixed);
+        let fixed = |t: &str| width_mm(t, 3.0, Typeface::Fixed);
         assert!((fixed("iii") - fixed("WWW")).abs() < 1e-9);
-        assert!(width_mm("iii", 3.0, Face::Text) < width_mm("WWW", 3.0, Face::Text));
+        assert!(width_mm("iii", 3.0, Typeface::Text) < width_mm("WWW", 3.0, Typeface::Text));
     }
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Value;
 
-use crate::project::{Key, Range, all_keys};
+use crate::project::{Key, ValueRange, all_keys};
 
 /// The most values of one axis.
 const MOST_VALUES: usize = 100_000;
@@ -11,7 +11,7 @@ const MOST_VALUES: usize = 100_000;
 /// A key with its values: a list of them, or so many evenly from one number to another.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Axis {
+pub struct StudyAxis {
     /// A key of the project (`touch.force_n`), an option of `hapdef limb` (`limb.thickness`), or `mesh`.
     pub key: String,
     values: Option<Vec<Value>>,
@@ -31,7 +31,7 @@ pub enum Subject<'a> {
     Project(&'static Key),
 }
 
-impl Axis {
+impl StudyAxis {
     /// That it says its values in one way.
     ///
     /// # Errors
@@ -118,7 +118,7 @@ impl Axis {
         // Both ends exactly.
         let number = from * (1.0 - share) + to * share;
         let whole = match self.subject() {
-            Ok(Subject::Project(key)) => matches!(key.range, Range::Whole(..)),
+            Ok(Subject::Project(key)) => matches!(key.range, ValueRange::Whole(..)),
             Ok(Subject::Limb(option)) => ["columns", "hoops"].contains(&option),
             _ => false,
         };
@@ -134,7 +134,7 @@ impl Axis {
 mod tests {
     use super::*;
 
-    fn axis(text: &str) -> Axis {
+    fn axis(text: &str) -> StudyAxis {
         toml::from_str(text).unwrap()
     }
 

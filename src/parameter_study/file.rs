@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::axis::Axis;
+use super::axis::StudyAxis;
 use super::front::Aim;
 use crate::budget::Quality;
 
@@ -23,10 +23,10 @@ pub struct ParameterStudy {
     #[serde(default)]
     pub seed: u64,
     /// What is varied.
-    pub base: Base,
+    pub base: StudyBase,
     /// Along what.
     #[serde(default, rename = "axis")]
-    pub axes: Vec<Axis>,
+    pub axes: Vec<StudyAxis>,
     /// What is wanted of it.
     #[serde(default)]
     pub aim: Aim,
@@ -51,7 +51,7 @@ pub enum Combine {
 /// What is varied.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Base {
+pub struct StudyBase {
     /// A project or a mesh, relative to the study's file.
     pub project: Option<String>,
     /// The bundled limb, or one of its family.

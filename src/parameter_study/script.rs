@@ -15,7 +15,7 @@ pub enum Engine {
 
 /// What a unit may take, as far as that is foreseen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Job {
+pub struct UnitLimits {
     /// Units of the study.
     pub units: usize,
     /// Units that one task runs one after another: those that share a simulation, or as many as are worth a start.
@@ -30,7 +30,7 @@ pub struct Job {
 
 /// A script and the command that hands it in.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Script {
+pub struct JobScript {
     /// Name of its file, in the study's folder.
     pub name: &'static str,
     /// Its text.
@@ -39,14 +39,14 @@ pub struct Script {
     pub command: String,
 }
 
-impl Job {
+impl UnitLimits {
     fn tasks(&self) -> usize {
         self.units.div_ceil(self.together.max(1)).max(1)
     }
 
     /// The script for an engine; `program` is what runs `hapdef`.
     #[must_use]
-    pub fn script(&self, engine: Engine, program: &str) -> Script {
+    pub fn script(&self, engine: Engine, program: &str) -> JobScript {
         let mut text = String::from("#!/bin/sh\n");
         let last = self.tasks() - 1;
         let (minutes, memory, threads) = (self.minutes, self.memory_gb, self.threads);
@@ -86,7 +86,7 @@ impl Job {
                 ),
             ),
         };
-        Script {
+        JobScript {
             name,
             text,
             command,
@@ -98,7 +98,7 @@ impl Job {
 mod tests {
     use super::*;
 
-    const JOB: Job = Job {
+    const JOB: UnitLimits = UnitLimits {
         units: 25,
         together: 10,
         minutes: 30,

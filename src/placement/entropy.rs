@@ -4,7 +4,7 @@
 use super::constraints::PartialSet;
 use super::exchange::{self, Criterion};
 use super::information::{Conditional, Geometry, Observed, finish, grow, with_each};
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
+use super::{PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, report};
 
 /// The selector. The pool's sites must be the first locations of the geometry.
@@ -22,9 +22,9 @@ impl Selector for Entropy<'_> {
         true
     }
 
-    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
+    fn select(&self, pool: &Pool, request: &SelectionRequest) -> Result<Selection, PlacementError> {
         let empty = self.geometry.field(pool, request, "Entropy")?;
-        let mut sought = Sought {
+        let mut sought = EntropySought {
             geometry: self.geometry,
             request,
         };
@@ -42,12 +42,12 @@ impl Selector for Entropy<'_> {
 }
 
 /// The entropy of a set of measurements, negative.
-struct Sought<'a> {
+struct EntropySought<'a> {
     geometry: &'a Geometry,
-    request: &'a Request<'a>,
+    request: &'a SelectionRequest<'a>,
 }
 
-impl Sought<'_> {
+impl EntropySought<'_> {
     fn report(&self, chosen: usize) -> Result<(), Cancelled> {
         let wanted = self.request.constraints.sensors;
         report(self.request.watch, "Selecting by entropy", chosen, wanted)
@@ -100,7 +100,7 @@ impl Observed for Entropies<'_> {
     }
 }
 
-impl Criterion for Sought<'_> {
+impl Criterion for EntropySought<'_> {
     const UNIT: &'static str = "nats";
 
     fn as_reported(value: f64) -> f64 {

@@ -3,7 +3,7 @@
 //! it never gives back, and what was best alone need not be among the best together.
 
 use super::constraints::{Constraints, PartialSet, reached};
-use super::{PlacementError, Pool, Request, SensorSet};
+use super::{PlacementError, Pool, SelectionRequest, SensorSet};
 use crate::plain;
 
 /// How often each gauge may be exchanged.
@@ -87,7 +87,7 @@ pub(super) trait Criterion {
 }
 
 /// What was chosen.
-pub(super) struct Chosen<'f> {
+pub(super) struct Exchanged<'f> {
     /// As the set grew.
     pub field: PartialSet<'f>,
     pub sets: Vec<SensorSet>,
@@ -104,25 +104,25 @@ pub(super) struct Chosen<'f> {
 pub(super) fn search<'f, C: Criterion>(
     criterion: &mut C,
     pool: &Pool,
-    request: &Request,
+    request: &SelectionRequest,
     empty: &PartialSet<'f>,
     rounds: usize,
-) -> Result<Chosen<'f>, PlacementError> {
+) -> Result<Exchanged<'f>, PlacementError> {
     let starts = request.constraints.thorough.starts;
     if rounds == 0 && starts <= 1 {
         let (field, sets) = criterion.grow(empty.clone(), request.found)?;
-        return Ok(Chosen {
+        return Ok(Exchanged {
             places: field.chosen.clone(),
             field,
             sets,
             notes: Vec::new(),
         });
     }
-    let mut best = Run::new(criterion, empty, None, rounds, request.found)?;
+    let mut best = GrownSet::new(criterion, empty, None, rounds, request.found)?;
     let (begun, mut from) = (best.value, 1);
     let other_starts = other_starts(criterion, pool, &best, empty, starts.saturating_sub(1))?;
     for (&margin, start) in other_starts.iter().zip(2..) {
-        let run = Run::new(criterion, empty, Some(margin), rounds, &|_| ())?;
+        let run = GrownSet::new(criterion, empty, Some(margin), rounds, &|_| ())?;
         if run.beats(&best, request.constraints) {
             (best, from) = (run, start);
         }
@@ -145,7 +145,7 @@ pub(super) fn search<'f, C: Criterion>(
     {
         (request.found)(last);
     }
-    Ok(Chosen {
+    Ok(Exchanged {
         field: best.field,
         sets: best.sets,
         places: best.places,
@@ -163,7 +163,7 @@ pub(super) fn rounds_asked(constraints: &Constraints) -> usize {
 }
 
 /// A set that grew from one first gauge, and what exchanges made of it.
-struct Run<'f> {
+struct GrownSet<'f> {
     field: PartialSet<'f>,
     sets: Vec<SensorSet>,
     /// Its criterion as it grew.
@@ -172,7 +172,7 @@ struct Run<'f> {
     value: f64,
 }
 
-impl<'f> Run<'f> {
+impl<'f> GrownSet<'f> {
     fn new<C: Criterion>(
         criterion: &mut C,
         empty: &PartialSet<'f>,
@@ -297,7 +297,7 @@ fn exchange<C: Criterion>(
 fn other_starts<C: Criterion>(
     criterion: &mut C,
     pool: &Pool,
-    run: &Run,
+    run: &GrownSet,
     empty: &PartialSet,
     count: usize,
 ) -> Result<Vec<usize>, PlacementError> {
@@ -433,7 +433,7 @@ mod tests {
             sites: &[10, 11, 12, 13, 14, 15],
             positions: &[],
         };
-        let request = Request {
+        let request = SelectionRequest {
             constraints,
             watch: &unwatched,
             found: &|_| {},

@@ -18,27 +18,27 @@ mod scene;
 
 pub use self::certificate::{ASSUMES, Certificate, certify};
 pub use self::elliptic::mean_length;
-pub use self::hand::{BLIND, Hand, blind, least_helpful, most_helpful};
-pub use self::mistaken::{Mistaken, Pair, posterior, taken_for, worst_pairs};
+pub use self::hand::{BLIND, GaugeInHand, blind, least_helpful, most_helpful};
+pub use self::mistaken::{Mistaken, MistakenPair, posterior, taken_for, worst_pairs};
 pub use self::moving::Moving;
 pub use self::scene::{
-    Detail, Forces, Knowledge, NUISANCES, Scatter, Scene, Shared, SiteSignal, Template, Variance,
-    templates,
+    Detail, NUISANCES, ReadingScatter, SceneForces, SharedUnknowns, SignalKnowledge, SiteSignal,
+    Template, TouchScene, Variance, templates,
 };
 pub use super::exchange::ROUNDS;
 
 use self::bank::Bank;
 use self::expectation::{Expectation, Scenes, scan};
 use super::constraints::{PartialSet, shortage, unreached};
-use super::exchange::{self, Chosen};
+use super::exchange::{self, Exchanged};
 use super::margin;
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind};
+use super::{PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind};
 use crate::budget::{Achieved, Cancelled, StopReason, Work};
 
 /// The selector.
 pub struct ExpectedError<'a> {
     /// Noise, forces, and what else is off.
-    pub known: Knowledge<'a>,
+    pub known: SignalKnowledge<'a>,
     /// How many places and presses are looked at.
     pub detail: Detail,
     /// How often each gauge may be exchanged after all are chosen; none where sets must contain one another.
@@ -54,7 +54,7 @@ impl Selector for ExpectedError<'_> {
         self.rounds == 0
     }
 
-    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
+    fn select(&self, pool: &Pool, request: &SelectionRequest) -> Result<Selection, PlacementError> {
         let empty = PartialSet::new(pool, request.constraints)?;
         let scenes = Scenes::new(&self.known, self.detail, pool, request.watch)?;
         let mut expectation = Expectation::new(&scenes, pool, request, self.known.seed);
@@ -69,9 +69,9 @@ impl Selector for ExpectedError<'_> {
 /// Puts beside the last set how far it is at most from the best one.
 fn certify_last(
     expectation: &Expectation,
-    request: &Request,
+    request: &SelectionRequest,
     empty: &PartialSet,
-    chosen: &mut Chosen,
+    chosen: &mut Exchanged,
 ) -> Result<(), Cancelled> {
     let Some(last) = chosen.sets.last_mut() else {
         return Ok(());
@@ -85,10 +85,10 @@ fn certify_last(
 /// The selection, with what must be known of it.
 fn as_selection(
     pool: &Pool,
-    request: &Request,
-    chosen: Chosen,
+    request: &SelectionRequest,
+    chosen: Exchanged,
 ) -> Result<Selection, PlacementError> {
-    let Chosen { field, sets, .. } = chosen;
+    let Exchanged { field, sets, .. } = chosen;
     let mut notes = field.constant_notes();
     notes.extend(chosen.notes);
     notes.extend(margin::ties(&sets, margin::TOLERANCE));
@@ -121,7 +121,7 @@ fn as_selection(
 
 /// The expected error (mm) of a set of sites, and of each press.
 #[must_use]
-pub fn expected(scene: &Scene, sites: &[usize]) -> (f64, Vec<f64>) {
+pub fn expected(scene: &TouchScene, sites: &[usize]) -> (f64, Vec<f64>) {
     let bank = Bank::of(scene, sites);
     (bank.error(), bank.errors())
 }
@@ -129,7 +129,7 @@ pub fn expected(scene: &Scene, sites: &[usize]) -> (f64, Vec<f64>) {
 /// The part of the expected error (mm) of a set of sites that is left where one place is meant: its Bayesian
 /// Cramér–Rao bound.
 #[must_use]
-pub fn local(scene: &Scene, sites: &[usize]) -> f64 {
+pub fn local(scene: &TouchScene, sites: &[usize]) -> f64 {
     Bank::of(scene, sites).local()
 }
 
@@ -154,13 +154,13 @@ mod tests {
             sites: &[0, 1, 2, 3, 4, 5],
             positions: &[],
         };
-        let request = Request {
+        let request = SelectionRequest {
             constraints,
             watch: &unwatched,
             found: &|_| {},
         };
         let selector = ExpectedError {
-            known: Knowledge {
+            known: SignalKnowledge {
                 noise: 0.0,
                 variance: None,
                 shared: None,

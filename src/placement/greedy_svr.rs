@@ -20,10 +20,10 @@ pub use self::audit::{Audit, Comparison};
 pub use self::search::TIE;
 pub use self::settings::{GreedySvr, TOLERANCE};
 
-use self::search::Search;
+use self::search::GreedySearch;
 use super::constraints::{PartialSet, reached, shortage, unreached};
-use super::exchange::{self, Chosen};
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind};
+use super::exchange::{self, Exchanged};
+use super::{PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind};
 use crate::budget::{Achieved, StopReason};
 
 impl Selector for GreedySvr {
@@ -35,7 +35,7 @@ impl Selector for GreedySvr {
         true
     }
 
-    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
+    fn select(&self, pool: &Pool, request: &SelectionRequest) -> Result<Selection, PlacementError> {
         let constraints = request.constraints;
         if constraints.failure > 0.0 && constraints.loss.gauges > 1 {
             return Err(PlacementError::Refused {
@@ -45,10 +45,10 @@ impl Selector for GreedySvr {
         }
         let folds = self.split(pool.targets)?;
         let empty = PartialSet::new(pool, constraints)?;
-        let mut search = Search::new(self, pool, request, &folds);
+        let mut search = GreedySearch::new(self, pool, request, &folds);
         let rounds = exchange::rounds_asked(constraints);
         let chosen = exchange::search(&mut search, pool, request, &empty, rounds)?;
-        let Chosen { field, sets, .. } = chosen;
+        let Exchanged { field, sets, .. } = chosen;
         let ended = field.full() || reached(&sets, constraints);
         let mut cautions = Vec::new();
         match field.closed().filter(|_| !ended) {

@@ -4,9 +4,9 @@
 use serde::Serialize;
 
 use super::constraints::{PartialSet, shortage};
-use super::exchange::Chosen;
+use super::exchange::Exchanged;
 use super::margin::Best;
-use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, margin};
+use super::{PlacementError, Pool, Selection, SelectionRequest, SelectorKind, SensorSet, margin};
 use crate::budget::{Achieved, Cancelled, StopReason, Work};
 use crate::gaussian_process::{self, Covariance, GpKernel, GpTrial};
 use crate::plain;
@@ -67,7 +67,7 @@ impl Geometry {
     pub(super) fn field<'a>(
         &self,
         pool: &'a Pool<'a>,
-        request: &'a Request<'a>,
+        request: &'a SelectionRequest<'a>,
         name: &'static str,
     ) -> Result<PartialSet<'a>, PlacementError> {
         if request.constraints.failure > 0.0 {
@@ -206,11 +206,11 @@ pub(super) fn finish(
     selector: SelectorKind,
     criterion_unit: &'static str,
     pool: &Pool,
-    request: &Request,
+    request: &SelectionRequest,
     geometry: &Geometry,
-    chosen: Chosen,
+    chosen: Exchanged,
 ) -> Result<Selection, PlacementError> {
-    let Chosen { field, sets, .. } = chosen;
+    let Exchanged { field, sets, .. } = chosen;
     if sets.is_empty() {
         return Err(match field.closed() {
             Some(why) => PlacementError::NoRoom { why },

@@ -11,7 +11,7 @@ use faer::{Mat, Par, Side};
 use super::constraints::PartialSet;
 use super::exchange::{self, Criterion};
 use super::information::{Conditional, Geometry, Observed, finish, grow, with_each};
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
+use super::{PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, Watch, report};
 
 /// The selector. The pool's sites must be the first locations of the geometry.
@@ -31,9 +31,9 @@ impl Selector for MutualInformation<'_> {
         true
     }
 
-    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
+    fn select(&self, pool: &Pool, request: &SelectionRequest) -> Result<Selection, PlacementError> {
         let empty = self.geometry.field(pool, request, "Mutual information")?;
-        let mut sought = Sought {
+        let mut sought = InformationSought {
             geometry: self.geometry,
             inverse: Inverse::of(self.geometry, request.watch)?,
             request,
@@ -52,17 +52,17 @@ impl Selector for MutualInformation<'_> {
 }
 
 /// What a set of measurements says of all other locations, negative.
-struct Sought<'a> {
+struct InformationSought<'a> {
     geometry: &'a Geometry,
     inverse: Inverse,
-    request: &'a Request<'a>,
+    request: &'a SelectionRequest<'a>,
 }
 
 /// A set of measurements: what it leaves uncertain, all locations beside it, and what it says of them (nats).
 struct Informed<'a> {
     given: Conditional<'a>,
     noise: f64,
-    rest: Rest<'a>,
+    rest: UnchosenRest<'a>,
     information: f64,
 }
 
@@ -86,7 +86,7 @@ impl Observed for Informed<'_> {
     }
 }
 
-impl Sought<'_> {
+impl InformationSought<'_> {
     fn report(&self, chosen: usize) -> Result<(), Cancelled> {
         let wanted = self.request.constraints.sensors;
         report(self.request.watch, STAGE, chosen, wanted)
@@ -97,7 +97,7 @@ impl Sought<'_> {
         let mut measured = Informed {
             given: Conditional::nothing(covariance),
             noise: covariance.noise,
-            rest: Rest::of(&self.inverse),
+            rest: UnchosenRest::of(&self.inverse),
             information: 0.0,
         };
         for &place in places {
@@ -108,7 +108,7 @@ impl Sought<'_> {
     }
 }
 
-impl Criterion for Sought<'_> {
+impl Criterion for InformationSought<'_> {
     const UNIT: &'static str = "nats";
 
     fn as_reported(value: f64) -> f64 {
@@ -178,14 +178,14 @@ impl Inverse {
 }
 
 /// The same of all locations not chosen.
-struct Rest<'a> {
+struct UnchosenRest<'a> {
     all: &'a Inverse,
     diagonal: Vec<f64>,
     /// Columns taken out so far, scaled.
     removed: Vec<Vec<f64>>,
 }
 
-impl<'a> Rest<'a> {
+impl<'a> UnchosenRest<'a> {
     fn of(all: &'a Inverse) -> Self {
         Self {
             diagonal: all.diagonal.clone(),
@@ -240,7 +240,7 @@ mod tests {
             map: Vec::new(),
         };
         let inverse = Inverse::of(&geometry, &unwatched).unwrap();
-        let mut rest = Rest::of(&inverse);
+        let mut rest = UnchosenRest::of(&inverse);
         rest.remove(3);
         rest.remove(7);
         let left: Vec<usize> = (0..12).filter(|i| ![3, 7].contains(i)).collect();

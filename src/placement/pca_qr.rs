@@ -1,7 +1,9 @@
 //! PCA with pivoted QR as a selector: exact, deterministic, without a seed.
 
 use super::constraints::{self, Constraints, PartialSet};
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, margin};
+use super::{
+    PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind, SensorSet, margin,
+};
 use crate::budget::{Achieved, StopReason, Work, report};
 use crate::pca::Pca;
 
@@ -17,7 +19,7 @@ impl Selector for PcaQr {
         false
     }
 
-    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
+    fn select(&self, pool: &Pool, request: &SelectionRequest) -> Result<Selection, PlacementError> {
         PartialSet::new(pool, request.constraints)?;
         let pca = Pca::new(pool.x, request.constraints.sensors, request.watch)?;
         from_components(&pca, pool, request)
@@ -31,7 +33,7 @@ impl Selector for PcaQr {
 pub fn from_components(
     pca: &Pca,
     pool: &Pool,
-    request: &Request,
+    request: &SelectionRequest,
 ) -> Result<Selection, PlacementError> {
     let constraints = request.constraints;
     if constraints.failure > 0.0 {

@@ -5,7 +5,7 @@ use super::{PlacementError, Pool, Selection, SelectorKind, SensorSet};
 use crate::budget::Watch;
 
 /// What is asked of a selector.
-pub struct Request<'a> {
+pub struct SelectionRequest<'a> {
     /// What the set must keep to.
     pub constraints: &'a Constraints,
     /// Told of progress; may ask for a stop.
@@ -26,5 +26,5 @@ pub trait Selector: Sync {
     ///
     /// # Errors
     /// [`PlacementError`] where the pool does not allow it.
-    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError>;
+    fn select(&self, pool: &Pool, request: &SelectionRequest) -> Result<Selection, PlacementError>;
 }

@@ -81,14 +81,14 @@ impl Serialize for PartAxis {
 
 impl<'de> Deserialize<'de> for PartAxis {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Key)
+        deserializer.deserialize_any(AxisKey)
     }
 }
 
 /// Reads a word or three numbers.
-struct Key;
+struct AxisKey;
 
-impl<'de> Visitor<'de> for Key {
+impl<'de> Visitor<'de> for AxisKey {
     type Value = PartAxis;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {

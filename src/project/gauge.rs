@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::key::{Range, from};
+use super::key::{ValueRange, from};
 use super::keys::keys;
 use super::ranges::{FRICTION, LENGTH, OFF_MM, OFF_PERCENT, ROOM};
 use super::value::{MICRO, MM, any, is_default};
@@ -15,9 +15,9 @@ keys! {
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct GaugeKeys in "gauge" {
-        signal: Signal = Signal::Strain, "", Range::Words(&["strain", "displacement", "normal-displacement"]),
+        signal: Signal = Signal::Strain, "", ValueRange::Words(&["strain", "displacement", "normal-displacement"]),
             "what a site reports: strain is what a gauge measures, displacement what the paper used";
-        directions: usize = 1, "", Range::Whole(1, 4),
+        directions: usize = 1, "", ValueRange::Whole(1, 4),
             "that a gauge may have at one place: 1 along the largest strain, 2 also across it, up to 4";
         noise_microstrain: f64 = 1.0, "µε", from(0.0, 1e12),
             "standard deviation of a reading";

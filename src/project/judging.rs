@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::key::{Range, TEXT, from, within};
+use super::key::{TEXT, ValueRange, from, within};
 use super::keys::keys;
 use super::ranges::{FORCES, PLACES};
 use super::value::{any, is_default};
-use crate::budget::{Budget, Limits, Quality};
+use crate::budget::{Budget, BudgetLimits, Quality};
 use crate::evaluation::EstimatorKind;
 use crate::limb::BoxMm;
 
@@ -20,7 +20,7 @@ keys! {
         unexplained: f64 = 0.01, "", within(0.0, 1.0),
             "share of the held-out variance that the candidates may leave unexplained";
         #[serde(skip_serializing_if = "Option::is_none")]
-        count: Option<usize> = None, "", Range::Whole(1, 100_000),
+        count: Option<usize> = None, "", ValueRange::Whole(1, 100_000),
             "a fixed number of candidates instead";
     }
 }
@@ -32,7 +32,7 @@ keys! {
     pub struct EvaluationKeys in "evaluation" {
         // As `touch.forces_n`.
         #[serde(skip_serializing_if = "is_default")]
-        estimator: EstimatorKind = EstimatorKind::default(), "", Range::Words(&["matching", "svr"]),
+        estimator: EstimatorKind = EstimatorKind::default(), "", ValueRange::Words(&["matching", "svr"]),
             "what finds the touches that sets of gauges are judged by: \"matching\" (as live touch; strain only) or \"svr\" (the paper's)";
         #[serde(skip_serializing_if = "are_usual_judged_forces")]
         forces_n: Vec<f64> = JUDGED_N.to_vec(), "N", FORCES,
@@ -71,15 +71,15 @@ keys! {
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct BudgetKeys in "budget" {
-        quality: Quality = Quality::default(), "", Range::Words(&["draft", "standard", "reference"]),
+        quality: Quality = Quality::default(), "", ValueRange::Words(&["draft", "standard", "reference"]),
             "how much to spend for accuracy";
         // The largest whole number of a TOML file.
-        seed: u64 = 0, "", Range::Whole(0, i64::MAX as u64),
+        seed: u64 = 0, "", ValueRange::Whole(0, i64::MAX as u64),
             "of every random draw: the same seed gives the same design";
     } with {
         /// In place of some of the quality's own.
-        #[serde(skip_serializing_if = "Limits::are_none")]
-        limits: Limits = Limits::default();
+        #[serde(skip_serializing_if = "BudgetLimits::are_none")]
+        limits: BudgetLimits = BudgetLimits::default();
     }
 }
 
@@ -88,24 +88,24 @@ const MANY: u64 = 1_000_000;
 const LOOKED_AT: u64 = 5000;
 
 keys! {
-    Limits in "budget.limits" {
+    BudgetLimits in "budget.limits" {
         elements_percent, "%", from(1e-6, 1e6),
             "estimated error of displacements at which no elements are added; that of strains follows it";
-        vertices, "", Range::Whole(100, MANY),
+        vertices, "", ValueRange::Whole(100, MANY),
             "most vertices of the elastic model, whatever the number of touches; cells of a solid in proportion";
-        touches, "", Range::Whole(3, MANY),
+        touches, "", ValueRange::Whole(3, MANY),
             "most touches that the model is asked for";
-        candidates, "", Range::Whole(2, 100_000),
+        candidates, "", ValueRange::Whole(2, 100_000),
             "most candidates that the reduction keeps, where greedy SVR or a judge by regression asks for it";
-        expected_places, "", Range::Whole(20, LOOKED_AT),
+        expected_places, "", ValueRange::Whole(20, LOOKED_AT),
             "most places that a choice by expected error compares readings with";
-        expected_presses, "", Range::Whole(12, LOOKED_AT),
+        expected_presses, "", ValueRange::Whole(12, LOOKED_AT),
             "most presses that it is tried on";
-        selection_touches, "", Range::Whole(10, MANY),
+        selection_touches, "", ValueRange::Whole(10, MANY),
             "most touches that greedy SVR scores on";
-        selection_candidates, "", Range::Whole(2, 100_000),
+        selection_candidates, "", ValueRange::Whole(2, 100_000),
             "most candidates that it scores";
-        tuning_touches, "", Range::Whole(10, MANY),
+        tuning_touches, "", ValueRange::Whole(10, MANY),
             "most touches that hyper-parameters are searched on";
     }
 }
@@ -125,11 +125,11 @@ impl BudgetKeys {
 
     /// The limits that hold at a quality.
     #[must_use]
-    pub fn limits_at(&self, quality: Quality) -> Limits {
+    pub fn limits_at(&self, quality: Quality) -> BudgetLimits {
         if quality == self.quality {
             self.limits
         } else {
-            Limits::default()
+            BudgetLimits::default()
         }
     }
 }

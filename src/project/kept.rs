@@ -3,24 +3,24 @@
 use serde::{Deserialize, Serialize};
 
 use super::ChosenSite;
-use super::key::{Range, SWITCH, TEXT, from};
+use super::key::{SWITCH, TEXT, ValueRange, from};
 use super::keys::keys;
 use crate::budget::Quality;
 
 /// Nobody waits longer, nothing costs more, and no limb is larger.
-const FOUND: Range = from(0.0, 1e15);
-const COUNT: Range = Range::Whole(0, u32::MAX as u64);
+const FOUND: ValueRange = from(0.0, 1e15);
+const COUNT: ValueRange = ValueRange::Whole(0, u32::MAX as u64);
 
 keys! {
     /// A selection with what was found out about it.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
-    pub struct Kept in "kept" {
+    pub struct KeptSelection in "kept" {
         name: String, "", TEXT,
             "a selection that was kept to be compared";
-        selector: String, "", Range::Any("the name of a selector, or by-hand"),
+        selector: String, "", ValueRange::Any("the name of a selector, or by-hand"),
             "who chose it";
-        quality: Quality, "", Range::Words(&["draft", "standard", "reference"]),
+        quality: Quality, "", ValueRange::Words(&["draft", "standard", "reference"]),
             "that it was found at";
         cost: f64, "", FOUND,
             "of all its gauges together, 1 each where nothing else is said";

@@ -11,14 +11,14 @@ pub struct Key {
     /// Of its value; empty where it has none.
     pub unit: &'static str,
     /// What its value may be.
-    pub range: Range,
+    pub range: ValueRange,
     /// What it means: part of a sentence that begins with a small letter where it can.
     pub help: &'static str,
 }
 
 /// What a value may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Range {
+pub enum ValueRange {
     /// Numbers, and how far.
     Numbers(Span),
     /// Whole numbers from the first to the second.
@@ -39,17 +39,17 @@ pub struct Span {
 }
 
 /// `true` or `false`.
-pub(super) const SWITCH: Range = Range::Words(&["true", "false"]);
+pub(super) const SWITCH: ValueRange = ValueRange::Words(&["true", "false"]);
 /// The name of a mask.
-pub(super) const MASK: Range = Range::Any(
+pub(super) const MASK: ValueRange = ValueRange::Any(
     "the name of an array in the NPZ file beside the project, or of a group of the mesh file",
 );
 /// Words for people.
-pub(super) const TEXT: Range = Range::Any("a text");
+pub(super) const TEXT: ValueRange = ValueRange::Any("a text");
 
 /// Numbers from one to another, both included.
-pub(super) const fn from(least: f64, most: f64) -> Range {
-    Range::Numbers(Span {
+pub(super) const fn from(least: f64, most: f64) -> ValueRange {
+    ValueRange::Numbers(Span {
         least,
         most,
         has_least: true,
@@ -58,8 +58,8 @@ pub(super) const fn from(least: f64, most: f64) -> Range {
 }
 
 /// Numbers above one and up to another.
-pub(super) const fn above(least: f64, most: f64) -> Range {
-    Range::Numbers(Span {
+pub(super) const fn above(least: f64, most: f64) -> ValueRange {
+    ValueRange::Numbers(Span {
         least,
         most,
         has_least: false,
@@ -68,8 +68,8 @@ pub(super) const fn above(least: f64, most: f64) -> Range {
 }
 
 /// Numbers between two, neither of them included.
-pub(super) const fn within(least: f64, most: f64) -> Range {
-    Range::Numbers(Span {
+pub(super) const fn within(least: f64, most: f64) -> ValueRange {
+    ValueRange::Numbers(Span {
         least,
         most,
         has_least: false,
@@ -111,7 +111,7 @@ impl fmt::Display for Span {
     }
 }
 
-impl fmt::Display for Range {
+impl fmt::Display for ValueRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Numbers(span) => span.fmt(f),
@@ -143,7 +143,7 @@ impl Key {
         /// Share of the range at which a control stops before a bound.
         const SHORT: f64 = 1e-6;
         match self.range {
-            Range::Numbers(span) => {
+            ValueRange::Numbers(span) => {
                 let short = |has: bool| {
                     if has {
                         0.0
@@ -153,8 +153,8 @@ impl Key {
                 };
                 span.least + short(span.has_least)..=span.most - short(span.has_most)
             }
-            Range::Whole(least, most) => least as f64..=most as f64,
-            Range::Words(_) | Range::Any(_) => f64::NEG_INFINITY..=f64::INFINITY,
+            ValueRange::Whole(least, most) => least as f64..=most as f64,
+            ValueRange::Words(_) | ValueRange::Any(_) => f64::NEG_INFINITY..=f64::INFINITY,
         }
     }
 
@@ -162,7 +162,7 @@ impl Key {
     #[must_use]
     pub fn counts(&self) -> RangeInclusive<usize> {
         match self.range {
-            Range::Whole(least, most) => least as usize..=most as usize,
+            ValueRange::Whole(least, most) => least as usize..=most as usize,
             _ => 0..=usize::MAX,
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::key::{Range, above, from};
+use super::key::{ValueRange, above, from};
 use super::keys::keys;
 use super::ranges::{FRICTION, PLACES};
 use super::selection::ChosenSite;
@@ -17,11 +17,11 @@ keys! {
     #[serde(default, deny_unknown_fields)]
     pub struct LiveKeys in "live" {
         #[serde(skip_serializing_if = "Vec::is_empty")]
-        channels: Vec<usize> = Vec::new(), "", Range::Whole(0, MOST_CHANNELS as u64 - 1),
+        channels: Vec<usize> = Vec::new(), "", ValueRange::Whole(0, MOST_CHANNELS as u64 - 1),
             "the board's channel (from 0) of each gauge, [0, 1, …]; in their order when left out";
         gauge_factor: f64 = Chain::default().gauge_factor, "", above(0.0, 1e4),
             "relative change of resistance over strain";
-        active_arms: u8 = Chain::default().active_arms, "", Range::Whole(1, 4),
+        active_arms: u8 = Chain::default().active_arms, "", ValueRange::Whole(1, 4),
             "of each bridge, that the strain changes; a gauge with a dummy is 1";
         model_error: f64 = 0.0, "", from(0.0, 1.0),
             "what the model is off by beside gluing, as a share of the reading, where its elements leave less; a calibration finds it";

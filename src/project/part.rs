@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::PartAxis;
 use super::boxes;
-use super::key::{MASK, Range, from, within};
+use super::key::{MASK, ValueRange, from, within};
 use super::keys::keys;
 use super::ranges::{LENGTH, PLACES, ROOM};
 use super::value::{MM, any};
@@ -64,13 +64,13 @@ keys! {
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     pub struct Part in "part" {
-        mesh: String, "", Range::Any("a path, relative to the project file"),
+        mesh: String, "", ValueRange::Any("a path, relative to the project file"),
             "the mesh: glTF/GLB, OBJ, STL, PLY, Gmsh, Abaqus or Ansys";
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        unit: Option<Unit>, "", Range::Words(&["mm", "cm", "m", "in"]),
+        unit: Option<Unit>, "", ValueRange::Words(&["mm", "cm", "m", "in"]),
             "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none, Ansys may say its own";
         #[serde(default)]
-        body: usize, "", Range::Whole(0, u32::MAX as u64),
+        body: usize, "", ValueRange::Whole(0, u32::MAX as u64),
             "which connected body of the file, 0 being the one with the largest surface";
         #[serde(default)]
         weld_mm: f64, "mm", ROOM,
@@ -89,10 +89,10 @@ keys! {
         halve_mm: f64, "mm", ROOM,
             "edges longer than this are halved, so that there are vertices to paint on and to show fields at; 0 does so where triangles are large beside the part, 1000000 never";
         #[serde(default)]
-        elements: ElementKind, "", Range::Words(&["graded", "as-given"]),
+        elements: ElementKind, "", ValueRange::Words(&["graded", "as-given"]),
             "\"graded\": computed on a mesh of its own, finer where the strain changes; \"as-given\": on the file's triangles";
         #[serde(default)]
-        model: PartModel, "", Range::Words(&["shell", "solid"]),
+        model: PartModel, "", ValueRange::Words(&["shell", "solid"]),
             "\"shell\": the mesh is the middle of a wall; \"solid\": it encloses a part with walls";
         #[serde(default = "defaults::thickness")]
         thickness_mm: f64, "mm", LENGTH,
@@ -104,7 +104,7 @@ keys! {
         outside: Option<String>, "", MASK,
             "where touches land, in place of what is found by itself (solids): a mask";
         #[serde(default)]
-        axis: PartAxis, "", Range::Any("auto, x, y, z or a direction [x, y, z]"),
+        axis: PartAxis, "", ValueRange::Any("auto, x, y, z or a direction [x, y, z]"),
             "which way is up for views, unrolling and new boxes: \"auto\" (by the part's shape), \"x\", \"y\", \"z\" or a direction [x, y, z]";
     }
 }
@@ -185,7 +185,7 @@ keys! {
     #[serde(deny_unknown_fields)]
     pub struct SupportKeys in "support" {
         #[serde(default)]
-        kind: SupportKind, "", Range::Words(&["clamped", "pinned", "symmetry"]),
+        kind: SupportKind, "", ValueRange::Words(&["clamped", "pinned", "symmetry"]),
             "what is held: \"clamped\" (no displacement, no rotation), \"pinned\" (no displacement) or \"symmetry\" (a mirror plane)";
         #[serde(default, skip_serializing_if = "Option::is_none")]
         box_mm: Option<BoxMm>, "mm", PLACES,
@@ -197,7 +197,7 @@ keys! {
         vertices: Option<String>, "", MASK,
             "instead of a box: a mask in the NPZ file beside this one, or a group of the mesh file";
         #[serde(default)]
-        normal: Axis, "", Range::Words(&["x", "y", "z"]),
+        normal: Axis, "", ValueRange::Words(&["x", "y", "z"]),
             "of a symmetry plane; unused otherwise";
     }
 }

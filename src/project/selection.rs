@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::boxes;
-use super::key::{Range, SWITCH, from};
+use super::key::{SWITCH, ValueRange, from};
 use super::keys::keys;
 use super::ranges::{GAUGES, LENGTH, PLACES, ROOM};
 use super::value::{MM, any};
@@ -27,7 +27,7 @@ keys! {
     #[serde(default, deny_unknown_fields)]
     pub struct SelectionKeys in "selection" {
         selector: SelectorKind = SelectorKind::default(), "",
-            Range::Words(&["expected-error", "greedy-svr", "pca-qr", "entropy", "mutual-information"]),
+            ValueRange::Words(&["expected-error", "greedy-svr", "pca-qr", "entropy", "mutual-information"]),
             "whose sites are reported: \"expected-error\" (by matching, as live touch), or the paper's: \"greedy-svr\", \"pca-qr\", \"entropy\", \"mutual-information\"";
         sensors: usize = 10, "", GAUGES,
             "gauges to place";
@@ -54,13 +54,13 @@ keys! {
             "choose from signals with the gauge's noise added";
         failure: f64 = 0.0, "", from(0.0, 1.0),
             "probability that gauges are lost when they are needed: expected error and greedy SVR then choose sites that can do without each other";
-        lost: usize = Loss::default().gauges, "", Range::Whole(1, MOST_FAILED as u64),
+        lost: usize = Loss::default().gauges, "", ValueRange::Whole(1, MOST_FAILED as u64),
             "how many are lost together, any of them; greedy SVR weighs the loss of one only";
-        lost_by: LostBy = Loss::default().by, "", Range::Words(&["expected", "worst"]),
+        lost_by: LostBy = Loss::default().by, "", ValueRange::Words(&["expected", "worst"]),
             "of all the gauges that may be lost: the mean over them counts (\"expected\"), or those whose loss is the \"worst\"";
         exchange: bool = Thorough::default().exchange, "", SWITCH,
             "exchange gauges one at a time after all are chosen, while that makes the set better; expected error always does, PCA-QR never";
-        starts: usize = Thorough::default().starts, "", Range::Whole(1, 20),
+        starts: usize = Thorough::default().starts, "", ValueRange::Whole(1, 20),
             "from how many first gauges a set is begun; the best set is kept, for the time that each of them takes";
         refine: bool = false, "", SWITCH,
             "move the gauges that expected error has chosen off the sites, along the surface and by their angle, while the expected error falls (strain only)";

@@ -3,11 +3,11 @@
 use super::keys::KeyTable;
 use super::{
     BadValue, BudgetKeys, CalibrationKeys, CandidateKeys, ChosenSite, CostKeys, EvaluationKeys,
-    FeasibleKeys, GaugeKeys, GaussianProcessKeys, GluedKeys, Kept, KeptError, KeptFailure, Key,
-    LiveKeys, MaterialKeys, Part, Project, RegionKeys, SelectionKeys, SiteKeys, SupportKeys,
+    FeasibleKeys, GaugeKeys, GaussianProcessKeys, GluedKeys, KeptError, KeptFailure, KeptSelection,
+    Key, LiveKeys, MaterialKeys, Part, Project, RegionKeys, SelectionKeys, SiteKeys, SupportKeys,
     ToleranceKeys, TouchKeys,
 };
-use crate::budget::Limits;
+use crate::budget::BudgetLimits;
 
 /// How a table stands in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,10 +114,10 @@ pub fn all_keys() -> Vec<&'static Key> {
         EvaluationKeys::keys(),
         RegionKeys::keys(),
         BudgetKeys::keys(),
-        Limits::keys(),
+        BudgetLimits::keys(),
         LiveKeys::keys(),
         GluedKeys::keys(),
-        Kept::keys(),
+        KeptSelection::keys(),
         KeptError::keys(),
         KeptFailure::keys(),
     ]

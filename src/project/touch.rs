@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::key::{MASK, Range, SWITCH, from};
+use super::key::{MASK, SWITCH, ValueRange, from};
 use super::keys::keys;
 use super::ranges::{FORCES, FRICTION, LENGTH, OFF_MM, ROOM};
 use super::value::{MM, any, is_default};
@@ -27,7 +27,7 @@ keys! {
         #[serde(skip_serializing_if = "is_default")]
         friction_percent: f64 = 0.0, "%", FRICTION,
             "how much of a touch's force drags along the surface, beside what presses (rms, in any direction)";
-        count: usize = 4000, "", Range::Whole(3, 1_000_000),
+        count: usize = 4000, "", ValueRange::Whole(3, 1_000_000),
             "touches that are simulated; lower qualities take fewer";
         edge_margin_mm: f64 = 2.4, "mm", ROOM,
             "least distance of a touch from a free edge";
@@ -86,14 +86,14 @@ fn are_usual_forces(forces_n: &[f64; 2]) -> bool {
 /// How sites are laid out on the inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Lattice {
+pub enum SiteLattice {
     /// Spread evenly over any surface.
     #[default]
     Even,
     /// Rows and columns in the unrolled view.
     Unrolled,
 }
-any!(Lattice);
+any!(SiteLattice);
 
 keys! {
     /// Keys of the table `sites`.
@@ -102,7 +102,7 @@ keys! {
     pub struct SiteKeys in "sites" {
         spacing_mm: f64 = 2.1, "mm", LENGTH,
             "between the possible gauge positions on the inside";
-        lattice: Lattice = Lattice::Even, "", Range::Words(&["even", "unrolled"]),
+        lattice: SiteLattice = SiteLattice::Even, "", ValueRange::Words(&["even", "unrolled"]),
             "how they are laid out: \"even\" (any surface) or \"unrolled\" (rows and columns about the axis)";
     }
 }
@@ -122,7 +122,7 @@ keys! {
     pub struct FeasibleKeys in "feasible" {
         support_clearance_mm: f64 = 8.0, "mm", ROOM,
             "least distance of a gauge over the surface from anything held";
-        edge_neighbours: usize = 20, "", Range::Whole(0, 1000),
+        edge_neighbours: usize = 20, "", ValueRange::Whole(0, 1000),
             "k of the paper's centre-of-mass filter: so many neighbours of a site";
         edge_radius_mm: f64 = 2.1, "mm", ROOM,
             "how far the centre of mass of these neighbours may lie from the site";

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use serde::Serialize;
 
-use super::key::{Key, Range, number};
+use super::key::{Key, ValueRange, number};
 
 pub(super) const MM: f64 = 1e-3;
 pub(super) const MICRO: f64 = 1e-6;
@@ -158,7 +158,7 @@ fn rows<const N: usize>(all: &[[f64; N]]) -> Option<toml::Value> {
 
 /// Holds numbers against the range of their key.
 fn numbers(key: &Key, kind: &str, values: &[f64]) -> Result<(), BadValue> {
-    let Range::Numbers(span) = key.range else {
+    let ValueRange::Numbers(span) = key.range else {
         return Ok(());
     };
     let outside = values.iter().find(|&&value| !span.contains(value));
@@ -173,7 +173,7 @@ fn numbers(key: &Key, kind: &str, values: &[f64]) -> Result<(), BadValue> {
 
 /// Holds whole numbers against the range of their key.
 fn counts(key: &Key, kind: &str, values: &[u64]) -> Result<(), BadValue> {
-    let Range::Whole(least, most) = key.range else {
+    let ValueRange::Whole(least, most) = key.range else {
         return Ok(());
     };
     let outside = values.iter().find(|count| !(least..=most).contains(count));

@@ -20,7 +20,7 @@ const AXES: usize = 3;
 const RELAX: f64 = 1.7;
 
 /// What all candidates of a step share.
-pub struct Setting {
+pub struct AdmmSetting {
     /// Targets, touches × (3 × folds): fold f has the columns 3f, 3f + 1, 3f + 2.
     pub y: Mat<f64>,
     /// Each fold's test touches.
@@ -35,17 +35,17 @@ pub struct Setting {
 
 /// Where the iteration stands: residuals and scaled multipliers, both touches × (3 × folds).
 #[derive(Clone)]
-pub struct State {
+pub struct AdmmState {
     /// Residuals.
     pub z: Mat<f64>,
     /// Scaled multipliers.
     pub u: Mat<f64>,
 }
 
-impl State {
+impl AdmmState {
     /// Where nothing is known yet.
     #[must_use]
-    pub fn zero(setting: &Setting) -> Self {
+    pub fn zero(setting: &AdmmSetting) -> Self {
         let (n, columns) = (setting.y.nrows(), setting.y.ncols());
         Self {
             z: Mat::zeros(n, columns),
@@ -59,9 +59,9 @@ impl State {
 /// (asked every few ten milliseconds) says so.
 #[must_use]
 pub fn iterate(
-    setting: &Setting,
+    setting: &AdmmSetting,
     phi: MatRef<f64>,
-    state: &mut State,
+    state: &mut AdmmState,
     iterations: usize,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<f64> {
@@ -103,7 +103,7 @@ pub fn iterate(
 
 /// (D/ρ + ΦᵀΦ)⁻¹ over each fold's training touches, D the identity without the bias.
 fn factor_folds(
-    setting: &Setting,
+    setting: &AdmmSetting,
     phi: MatRef<f64>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Vec<Llt<f64>>> {
@@ -143,7 +143,7 @@ fn factor_folds(
 }
 
 /// New residuals and multipliers from predictions, and the next right-hand side.
-fn update(setting: &Setting, p: MatRef<f64>, state: &mut State, v: &mut Mat<f64>) {
+fn update(setting: &AdmmSetting, p: MatRef<f64>, state: &mut AdmmState, v: &mut Mat<f64>) {
     let limit = setting.c / setting.rho;
     for j in 0..p.ncols() {
         let fold = &setting.folds[j / AXES];
@@ -190,7 +190,7 @@ wide! {
     }
 }
 
-fn test_error(setting: &Setting, p: MatRef<f64>) -> f64 {
+fn test_error(setting: &AdmmSetting, p: MatRef<f64>) -> f64 {
     let fold_error = |(f, fold): (usize, &Range<usize>)| {
         let sum: f64 = fold
             .clone()

@@ -32,7 +32,7 @@ impl Predictor {
         let standardizer = Standardizer::of(x);
         let training = standardizer.apply(x);
         let kernel = gaussian(&squared_distances(&training, &training), gamma);
-        let fits: Vec<svr::Fit> = (targets.par_iter().zip(params))
+        let fits: Vec<svr::SvrFit> = (targets.par_iter().zip(params))
             .map(|(y, params)| svr::fit(&kernel, y, params, None))
             .collect();
         let support: Vec<usize> = (0..x.columns())

@@ -16,13 +16,13 @@ mod problem;
 mod smo;
 
 use crate::tally::{self, Done};
-use smo::Block;
+use smo::WorkingSet;
 
 pub use problem::{Problem, Start, SvrParams};
 
 /// A fitted model in one coordinate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub struct SvrFit {
     /// One a point; zero for those held out.
     pub beta: Vec<f64>,
     /// Added to every prediction.
@@ -41,7 +41,7 @@ pub struct Fit {
 
 /// Fits all points, from `warm` (coefficients of a similar fit) or from zero.
 #[must_use]
-pub fn fit(kernel: &[f64], y: &[f64], params: &SvrParams, warm: Option<&[f64]>) -> Fit {
+pub fn fit(kernel: &[f64], y: &[f64], params: &SvrParams, warm: Option<&[f64]>) -> SvrFit {
     let problem = Problem {
         kernel,
         y,
@@ -59,13 +59,13 @@ pub fn solve(
     params: &SvrParams,
     start: Option<Start>,
     stop: &(dyn Fn() -> bool + Sync),
-) -> Fit {
+) -> SvrFit {
     tally::count(Done::Fit, 1);
-    let mut block = Block::new(problem, params);
+    let mut block = WorkingSet::new(problem, params);
     if let Some(start) = start.filter(|s| s.beta.len() == problem.y.len()) {
         block.start(problem.y, start);
     }
-    let mut effort = Effort {
+    let mut effort = StepLimit {
         steps: 0,
         most: params.max_steps,
         stop,
@@ -76,7 +76,7 @@ pub fn solve(
 
 /// Predictions from kernel rows between new points and the training points (m × n by rows).
 #[must_use]
-pub fn predict(fit: &Fit, kernel: &[f64]) -> Vec<f64> {
+pub fn predict(fit: &SvrFit, kernel: &[f64]) -> Vec<f64> {
     let n = fit.beta.len();
     kernel
         .chunks_exact(n.max(1))
@@ -85,13 +85,13 @@ pub fn predict(fit: &Fit, kernel: &[f64]) -> Vec<f64> {
 }
 
 /// Steps taken so far, and what ends them.
-struct Effort<'a> {
+struct StepLimit<'a> {
     steps: usize,
     most: usize,
     stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl Effort<'_> {
+impl StepLimit<'_> {
     fn spent(&self) -> bool {
         self.steps >= self.most || (self.stop)()
     }
@@ -105,7 +105,7 @@ const WORTH: f64 = 0.7;
 const PROGRESS: f64 = 0.1;
 
 /// Lowers a block's violation to the tolerance; returns what is left of it.
-fn descend(block: &mut Block, tolerance: f64, effort: &mut Effort) -> f64 {
+fn descend(block: &mut WorkingSet, tolerance: f64, effort: &mut StepLimit) -> f64 {
     // A warm start is mostly right about who is free: it is worth solving for them before anything else.
     let mut fresh = true;
     // Work of pair steps since the free coefficients were last solved for.
@@ -145,7 +145,13 @@ fn descend(block: &mut Block, tolerance: f64, effort: &mut Effort) -> f64 {
     }
 }
 
-fn finish(block: &Block, problem: &Problem, params: &SvrParams, gap: f64, steps: usize) -> Fit {
+fn finish(
+    block: &WorkingSet,
+    problem: &Problem,
+    params: &SvrParams,
+    gap: f64,
+    steps: usize,
+) -> SvrFit {
     let epsilon = params.epsilon;
     let (mut sum, mut free) = (0.0, 0usize);
     for i in block.free() {
@@ -167,7 +173,7 @@ fn finish(block: &Block, problem: &Problem, params: &SvrParams, gap: f64, steps:
         .zip(problem.y)
         .map(|((b, f), y)| 0.5 * b * (f - y) + epsilon * b.abs())
         .sum();
-    Fit {
+    SvrFit {
         converged: gap <= params.tolerance,
         residuals: block.f.iter().map(|f| f + bias).collect(),
         beta: block.beta.clone(),

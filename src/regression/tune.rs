@@ -7,7 +7,7 @@ use super::features::Standardizer;
 use super::folds::Folds;
 use super::kernel::{gaussian, squared_distances};
 use super::places::Grouping;
-use super::svr::{self, Fit, Problem, Start};
+use super::svr::{self, Problem, Start, SvrFit};
 use crate::budget::{Cancelled, Progress, Watch, Work, report};
 use crate::dataset::SignalMatrix;
 
@@ -83,7 +83,7 @@ pub struct PositionModel {
     standardizer: Standardizer,
     training: SignalMatrix,
     gamma: f64,
-    fits: [Fit; 3],
+    fits: [SvrFit; 3],
     /// What the fits took.
     pub work: Work,
 }
@@ -100,7 +100,7 @@ impl PositionModel {
             let y: Vec<f64> = targets.iter().map(|t| t[axis]).collect();
             svr::fit(&kernel, &y, &params, None)
         };
-        let fits: Vec<Fit> = [0, 1, 2].into_par_iter().map(fit).collect();
+        let fits: Vec<SvrFit> = [0, 1, 2].into_par_iter().map(fit).collect();
         let work = Work {
             kernel_evaluations: kernel.len() as u64,
             fits: 3,
@@ -152,7 +152,7 @@ pub fn distances(predicted: &[[f64; 3]], truth: &[[f64; 3]]) -> Vec<f64> {
 
 /// One point of a search: the settings and their cross-validated error (mm).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Trial {
+pub struct TuningTrial {
     /// The settings.
     pub hyper: Hyper,
     /// Cross-validated error (mm).
@@ -161,12 +161,12 @@ pub struct Trial {
 
 /// The outcome of a search: the best settings and every trial, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Search {
+pub struct TuningSearch {
     /// Every trial, in order.
-    pub trials: Vec<Trial>,
+    pub trials: Vec<TuningTrial>,
 }
 
-impl Search {
+impl TuningSearch {
     /// The settings with the smallest error; of those within a hundredth of it the smallest C, which is
     /// the smoothest model and the cheapest.
     #[must_use]
@@ -192,7 +192,7 @@ impl Search {
 /// The values a search looks at. γ is multiplied by 10 / sensors, because the squared distance between
 /// standardized signals grows with their number. The default is for parts of the bundled limb's size.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Grid {
+pub struct TuningGrid {
     /// Values of C (mm).
     pub c: Vec<f64>,
     /// Values of ε (mm).
@@ -201,7 +201,7 @@ pub struct Grid {
     pub gamma: Vec<f64>,
 }
 
-impl Default for Grid {
+impl Default for TuningGrid {
     fn default() -> Self {
         Self {
             c: vec![20.0, 200.0, 2000.0],
@@ -211,7 +211,7 @@ impl Default for Grid {
     }
 }
 
-impl Grid {
+impl TuningGrid {
     /// For targets so many times as large.
     #[must_use]
     pub fn scaled(mut self, by: f64) -> Self {
@@ -243,15 +243,15 @@ pub struct CrossValidation {
 pub fn search(
     x: &SignalMatrix,
     targets: &[[f64; 3]],
-    grid: &Grid,
+    grid: &TuningGrid,
     validation: &CrossValidation,
     watch: Watch,
-) -> Result<(Search, Work), Cancelled> {
+) -> Result<(TuningSearch, Work), Cancelled> {
     let groups = validation.grouping.of(targets);
     let folds = Folds::of_groups(&groups, validation.folds, validation.seed);
     let z = Standardizer::of(x).apply(x).select_columns(&folds.order);
     let axis = |a: usize| folds.order.iter().map(|&t| targets[t][a]).collect();
-    let bench = Bench {
+    let bench = TuningFolds {
         squared: squared_distances(&z, &z),
         targets: [0, 1, 2].map(axis),
         folds,
@@ -260,12 +260,12 @@ pub fn search(
     };
     let relative = 10.0 / x.rows().max(1) as f64;
     let middle = grid.epsilon[grid.epsilon.len() / 2];
-    let columns: Result<Vec<Vec<Trial>>, Cancelled> = grid
+    let columns: Result<Vec<Vec<TuningTrial>>, Cancelled> = grid
         .gamma
         .par_iter()
         .map(|g| bench.column(g * relative, middle, &grid.c))
         .collect();
-    let mut search = Search {
+    let mut search = TuningSearch {
         trials: columns?.into_iter().flatten().collect(),
     };
     let best = search.best();
@@ -275,7 +275,7 @@ pub fn search(
         .copied()
         .filter(|&e| e != middle)
         .collect();
-    let more: Result<Vec<Vec<Trial>>, Cancelled> = others
+    let more: Result<Vec<Vec<TuningTrial>>, Cancelled> = others
         .par_iter()
         .map(|&e| bench.column(best.gamma, e, &[best.c]))
         .collect();
@@ -289,7 +289,7 @@ pub fn search(
 }
 
 /// What all trials of one search share; touches in the order of their folds.
-struct Bench<'a> {
+struct TuningFolds<'a> {
     squared: Vec<f64>,
     targets: [Vec<f64>; 3],
     folds: Folds,
@@ -297,9 +297,9 @@ struct Bench<'a> {
     watch: Watch<'a>,
 }
 
-impl Bench<'_> {
+impl TuningFolds<'_> {
     /// Trials over rising C on one kernel, each starting from the one before.
-    fn column(&self, gamma: f64, epsilon: f64, c: &[f64]) -> Result<Vec<Trial>, Cancelled> {
+    fn column(&self, gamma: f64, epsilon: f64, c: &[f64]) -> Result<Vec<TuningTrial>, Cancelled> {
         let kernel = gaussian(&self.squared, gamma);
         let mut warm: Vec<Option<[Vec<f64>; 3]>> = vec![None; self.folds.parts.len()];
         let mut trials = Vec::with_capacity(c.len());
@@ -311,7 +311,7 @@ impl Bench<'_> {
                 .sum::<f64>();
             report(self.watch, STAGE, k, 3)?;
             let error_mm = sum / self.folds.parts.len() as f64;
-            trials.push(Trial { hyper, error_mm });
+            trials.push(TuningTrial { hyper, error_mm });
         }
         Ok(trials)
     }
@@ -354,7 +354,7 @@ const STAGE: &str = "Tuning the regression";
 
 /// Mean Euclidean length of the residuals of some fits (one a coordinate) at some points.
 #[must_use]
-pub fn mean_distance(fits: &[Fit], at: std::ops::Range<usize>) -> f64 {
+pub fn mean_distance(fits: &[SvrFit], at: std::ops::Range<usize>) -> f64 {
     let count = at.len().max(1) as f64;
     let length = |i: usize| {
         fits.iter()

@@ -9,21 +9,21 @@ use std::sync::Arc;
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use eframe::wgpu::{self, util::DeviceExt};
 
-pub use self::data::{Shown, Solid, Uniforms, Vertex};
+pub use self::data::{GpuVertex, Shown, Solid, Uniforms};
 use self::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES, layout};
 use crate::colormap::{ColorMap, TABLE};
 use crate::tally::{self, Done};
 
 /// Pictures that a window shows side by side, each with a target of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Slot {
+pub enum PictureSlot {
     Limb,
     Unrolled,
 }
 
 /// One frame to be drawn.
 pub struct Frame3d {
-    pub slot: Slot,
+    pub slot: PictureSlot,
     pub solid: Arc<Solid>,
     /// One a vertex.
     pub shown: Arc<Vec<Shown>>,

@@ -8,14 +8,14 @@ use std::time::{Duration, Instant};
 use super::jobs::{Task, stop};
 use super::slot::Slot;
 use super::state::Session;
-use super::state::bench::{Held, PlanInputs, Pressing, locked};
-use crate::bench::{Collector, Ended, News};
+use super::state::bench::{HoldGuard, PlanInputs, PressingPlan, locked};
+use crate::bench::{Collector, CollectorNews, RunEnd};
 use crate::budget::{Budget, Progress};
 use crate::design::{Inputs, Sensing};
 use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{Address, BY_HAND, BenchOrder, Pace};
-use crate::test_bed::{BenchRequest, Ready, Run, press_on_simulated};
+use crate::test_bed::{BenchRequest, PressingRun, Ready, press_on_simulated};
 
 impl Session {
     /// Chooses where is pressed, and shows it. Nothing moves.
@@ -24,7 +24,7 @@ impl Session {
             return;
         };
         let inputs = begin.inputs.clone();
-        let held = Held::new(&self.bench.plans);
+        let held = HoldGuard::new(&self.bench.plans);
         let work = move |r: &Reporter| {
             let _held = held;
             begin.ready(r)
@@ -36,7 +36,7 @@ impl Session {
             |s, inputs, (sensing, ready)| {
                 s.keep_sensing(&inputs, &sensing);
                 if !s.bench.goes_on() {
-                    *s.bench.locked() = Some(Pressing::new(inputs, ready));
+                    *s.bench.locked() = Some(PressingPlan::new(inputs, ready));
                 }
             },
         );
@@ -60,21 +60,21 @@ impl Session {
         self.bench.paused = false;
         let pressing = Arc::clone(&self.bench.pressing);
         let inputs = begin.inputs.clone();
-        let held = Held::new(&self.bench.runs);
+        let held = HoldGuard::new(&self.bench.runs);
         let work = move |r: &Reporter| {
             let _held = held;
             let (sensing, ready) = begin.ready(r)?;
-            let plan = Pressing::new(begin.inputs, Arc::clone(&ready));
+            let plan = PressingPlan::new(begin.inputs, Arc::clone(&ready));
             *locked(&pressing) = Some(plan);
             let ended = press(&ready, ports.as_ref(), &inbox, &pressing, r);
-            let stopped = |why: &anyhow::Error| Ended::Stopped(format!("{why:#}"));
-            let how = ended.as_ref().map_or_else(stopped, Ended::clone);
+            let stopped = |why: &anyhow::Error| RunEnd::Stopped(format!("{why:#}"));
+            let how = ended.as_ref().map_or_else(stopped, RunEnd::clone);
             if let Some(plan) = locked(&pressing).as_mut() {
                 plan.end(&how);
             }
             match how {
                 // Whoever stopped it need not be told that it is none.
-                Ended::Stopped(why) if why != BY_HAND => Err(Stop::Failed(why)),
+                RunEnd::Stopped(why) if why != BY_HAND => Err(Stop::Failed(why)),
                 _ => Ok(sensing),
             }
         };
@@ -201,7 +201,8 @@ impl Begin {
         let folder = &self.inputs.folder;
         std::fs::create_dir_all(folder)
             .map_err(|e| Stop::Failed(format!("{}: {e}", folder.display())))?;
-        let run = Run::new(self.inputs.asked.clone(), &self.project, folder).map_err(failed)?;
+        let run =
+            PressingRun::new(self.inputs.asked.clone(), &self.project, folder).map_err(failed)?;
         let watch = |p| r.report(p);
         let sensing = if let Some(sensing) = &self.known {
             Arc::clone(sensing)
@@ -220,17 +221,17 @@ fn press(
     ready: &Ready,
     ports: Option<&(Address, Address)>,
     inbox: &Receiver<BenchOrder>,
-    pressing: &Mutex<Option<Pressing>>,
+    pressing: &Mutex<Option<PressingPlan>>,
     r: &Reporter,
-) -> anyhow::Result<Ended> {
+) -> anyhow::Result<RunEnd> {
     let mut collector: Collector = ready.collector();
     if collector.left() == 0 {
-        return Ok(Ended::Finished);
+        return Ok(RunEnd::Finished);
     }
     let mut ended = false;
     let mut orders = || {
         let plan = locked(pressing);
-        let [made, failed] = plan.as_ref().map_or([0; 2], Pressing::made_and_failed);
+        let [made, failed] = plan.as_ref().map_or([0; 2], PressingPlan::made_and_failed);
         drop(plan);
         let progress = Progress {
             stage: "Pressing",
@@ -242,7 +243,7 @@ fn press(
         }
         inbox.try_recv().ok()
     };
-    let tell = |news: News| {
+    let tell = |news: CollectorNews| {
         let kept = ready.keep(&news);
         if let Some(plan) = locked(pressing).as_mut() {
             if let Err(why) = kept {

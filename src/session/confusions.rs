@@ -7,11 +7,11 @@ use super::jobs::Task;
 use super::latest::Latest;
 use super::slot::{Slot, current, take_in};
 use super::state::Session;
-use super::state::confusions::{BROKEN, ConfusionInputs, Question, Taken, serve};
+use super::state::confusions::{BROKEN, ConfusionInputs, ConfusionQuestion, TakenFor, serve};
 use crate::design::InHand;
 use crate::job::{Reporter, Stop};
 use crate::mesh::SurfacePoint;
-use crate::placement::expected_error::Pair;
+use crate::placement::expected_error::MistakenPair;
 
 impl Session {
     fn confusion_inputs(&self) -> Option<ConfusionInputs> {
@@ -90,7 +90,7 @@ impl Session {
         confusions.asked = Some((press, inputs.clone()));
         let worker = &mut confusions.worker;
         let worker = worker.get_or_insert_with(|| Latest::start(&self.wake, BROKEN, serve));
-        worker.ask(Question {
+        worker.ask(ConfusionQuestion {
             in_hand: Arc::clone(in_hand),
             set: set.to_vec(),
             press,
@@ -100,7 +100,7 @@ impl Session {
 
     /// What a touch at a place of the part is taken for, once that is known.
     #[must_use]
-    pub fn taken_for(&self, at: SurfacePoint) -> Option<&Taken> {
+    pub fn taken_for(&self, at: SurfacePoint) -> Option<&TakenFor> {
         let answer = self.caches.confusions.answer.as_ref()?;
         let (press, _) = self.in_hand()?.press_near(self.document.part.point(at))?;
         (press == answer.press).then_some(answer)
@@ -108,7 +108,7 @@ impl Session {
 
     /// The worst confusions of the gauges as they are, the worst first, once they are known.
     #[must_use]
-    pub fn worst_confusions(&self) -> Option<Arc<Vec<Pair>>> {
+    pub fn worst_confusions(&self) -> Option<Arc<Vec<MistakenPair>>> {
         let pairs = self.caches.confusions.pairs.as_ref();
         current(pairs, &self.confusion_inputs()?).map(Arc::clone)
     }

@@ -1,11 +1,11 @@
 //! The dial: the project set to what was measured to be quick or accurate enough.
 
 use super::state::Session;
-use crate::trade::{Point, Setting, TradeConstraint, answer, front};
+use crate::trade::{TradeConstraint, TradePoint, TradeSetting, answer, front};
 
 impl Session {
     /// Sets the project to a measured setting; what is kept computed follows.
-    pub fn apply_setting(&mut self, setting: &Setting) {
+    pub fn apply_setting(&mut self, setting: &TradeSetting) {
         setting.apply(&mut self.document.state.project);
         self.document.settle();
     }
@@ -26,8 +26,8 @@ impl Session {
     fn answer_to(
         &self,
         asked: TradeConstraint,
-        points: &[Point],
-    ) -> Result<(Setting, String), String> {
+        points: &[TradePoint],
+    ) -> Result<(TradeSetting, String), String> {
         if points.is_empty() {
             return Err(
                 "Nothing is measured of this project yet. Press “Measure the trade” first".into(),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::attention::Attention;
 use super::jobs::{Task, stop};
 use super::state::Session;
-use super::state::drive::{Goal, Making};
+use super::state::drive::{DriveGoal, RunningDesign};
 use super::state::results::{DesignResult, SimulationResult};
 use crate::budget::{Progress, Quality};
 use crate::dataset::Site;
@@ -23,14 +23,14 @@ const STILL: Duration = Duration::from_millis(400);
 impl Session {
     /// Simulates the project as it is now.
     pub fn simulate(&mut self) {
-        self.ask(Goal::Simulation);
+        self.ask(DriveGoal::Simulation);
     }
 
     /// Selects and evaluates, simulating first where that is stale.
     pub fn select(&mut self) {
         self.drive.take = true;
         self.drive.pressed = true;
-        self.ask(Goal::Design);
+        self.ask(DriveGoal::Design);
         // Where nothing is left to do, the gauges are at least those that were selected.
         if self.design_stands(self.quality()) {
             self.take_sites();
@@ -38,7 +38,7 @@ impl Session {
         }
     }
 
-    fn ask(&mut self, goal: Goal) {
+    fn ask(&mut self, goal: DriveGoal) {
         self.document.settle();
         self.drive.goal = self.drive.goal.max(Some(goal));
         self.jobs.forget_failures();
@@ -92,13 +92,13 @@ impl Session {
         }
     }
 
-    fn next_task(&self, goal: Goal) -> Option<Task> {
+    fn next_task(&self, goal: DriveGoal) -> Option<Task> {
         let asked = self.quality();
         let draft = Some(Quality::Draft).filter(|q| *q < asked);
         let next = |quality| self.next_task_at(goal, quality);
         let reached = match goal {
-            Goal::Simulation => self.simulation_at(asked).is_some(),
-            Goal::Design => self.design_stands(asked),
+            DriveGoal::Simulation => self.simulation_at(asked).is_some(),
+            DriveGoal::Design => self.design_stands(asked),
         };
         let task = if reached {
             None
@@ -108,11 +108,11 @@ impl Session {
         task.filter(|task| self.pipeline_failure(*task).is_none())
     }
 
-    fn next_task_at(&self, goal: Goal, quality: Quality) -> Option<Task> {
+    fn next_task_at(&self, goal: DriveGoal, quality: Quality) -> Option<Task> {
         if self.simulation_at(quality).is_none() {
             return Some(Task::Simulate(quality));
         }
-        let design = goal == Goal::Design && !self.design_stands(quality);
+        let design = goal == DriveGoal::Design && !self.design_stands(quality);
         design.then_some(Task::Design(quality))
     }
 
@@ -174,7 +174,7 @@ impl Session {
         let (simulated, known) = self.known(quality, simulated);
         let last = self.results.last_simulation(quality);
         let simulate_s = last.map_or(0.0, |s| s.value.seconds);
-        let making = Arc::<Mutex<Making>>::default();
+        let making = Arc::<Mutex<RunningDesign>>::default();
         self.drive.making = Arc::clone(&making);
         let work = move |r: &Reporter| {
             let start = Instant::now();
@@ -265,7 +265,7 @@ fn make(
     simulated: Arc<Simulated>,
     quality: Quality,
     known: KnownStages,
-    making: &Mutex<Making>,
+    making: &Mutex<RunningDesign>,
     r: &Reporter,
 ) -> Result<Design, Stop> {
     let start = Instant::now();

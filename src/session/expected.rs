@@ -7,7 +7,7 @@ use super::jobs::Task;
 use super::latest::Latest;
 use super::slot::{Slot, current, take_in};
 use super::state::Session;
-use super::state::expected::{BROKEN, ExpectedOf, Question, serve};
+use super::state::expected::{BROKEN, ExpectedOf, HandQuestion, serve};
 use crate::design::InHand;
 use crate::document::ExpectedInputs;
 use crate::evaluation::Judging;
@@ -118,7 +118,7 @@ impl Session {
             return;
         };
         self.caches.expected.questions += u64::from(!known);
-        let question = Question {
+        let question = HandQuestion {
             ready,
             in_hand: Arc::clone(in_hand),
             moves,

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::news::Event;
+use super::news::Happening;
 use super::state::Session;
 use crate::dataset::Site;
 use crate::elasticity::observe::tangent_frame;
@@ -94,7 +94,7 @@ impl Session {
         self.document.state.project.selection.sites = sites;
         self.drive.take = false;
         self.document.settle();
-        self.news.happened(Event::GaugesReplaced);
+        self.news.happened(Happening::GaugesReplaced);
     }
 
     /// The site for a gauge nearest to a place of the part: a feasible one that no other gauge has, or where nothing is

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::jobs::Task;
-use super::news::Event;
+use super::news::Happening;
 use super::state::Session;
 use crate::design::InHand;
 use crate::document::ExpectedInputs;
@@ -13,7 +13,7 @@ use crate::project::ChosenSite;
 
 /// Which gauge is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sought {
+enum SoughtGauge {
     Most,
     Least,
 }
@@ -21,7 +21,7 @@ enum Sought {
 /// What an answer holds for: these gauges, and what is expected of them.
 #[derive(Clone, PartialEq)]
 struct HelpInputs {
-    sought: Sought,
+    sought: SoughtGauge,
     sites: Vec<ChosenSite>,
     expected: ExpectedInputs,
 }
@@ -64,15 +64,15 @@ impl Session {
 
     /// Adds the gauge that helps most, once it is found.
     pub fn add_helpful(&mut self) {
-        self.start_helping(Sought::Most);
+        self.start_helping(SoughtGauge::Most);
     }
 
     /// Finds the gauge that helps least.
     pub fn find_spare(&mut self) {
-        self.start_helping(Sought::Least);
+        self.start_helping(SoughtGauge::Least);
     }
 
-    fn help_inputs(&self, sought: Sought) -> Option<HelpInputs> {
+    fn help_inputs(&self, sought: SoughtGauge) -> Option<HelpInputs> {
         Some(HelpInputs {
             sought,
             sites: self.document.state.project.selection.sites.clone(),
@@ -80,7 +80,7 @@ impl Session {
         })
     }
 
-    fn start_helping(&mut self, sought: Sought) {
+    fn start_helping(&mut self, sought: SoughtGauge) {
         self.document.settle();
         let (Some(simulation), Some(inputs)) = (&self.results.simulation, self.help_inputs(sought))
         else {
@@ -90,7 +90,7 @@ impl Session {
             return self.complain("A gauge lies at none of the sites that were simulated: move it with the tool “Gauges”, or take it away");
         };
         let open = self.open_sites();
-        if sought == Sought::Most && open.is_empty() {
+        if sought == SoughtGauge::Most && open.is_empty() {
             return self.complain("No free site is left for a gauge: widen the feasible region, or lower “Least spacing” (stage Selection)");
         }
         let simulated = Arc::clone(&simulation.value.simulated);
@@ -103,8 +103,8 @@ impl Session {
             };
             let in_hand = in_hand.map_err(|_| Stop::Cancelled)?;
             let found = match sought {
-                Sought::Most => in_hand.most_helpful(&set, &open, &watch),
-                Sought::Least => in_hand.least_helpful(&set, &watch),
+                SoughtGauge::Most => in_hand.most_helpful(&set, &open, &watch),
+                SoughtGauge::Least => in_hand.least_helpful(&set, &watch),
             };
             let found = found.map_err(|_| Stop::Cancelled)?;
             Ok(Helped { found, in_hand })
@@ -136,13 +136,13 @@ impl Session {
         self.take_in_hand(inputs.expected, helped.in_hand);
         match (helped.found, sought) {
             (None, _) => {}
-            (Some((site, mm)), Sought::Most) => self.add_gauge_at(site, mm),
-            (Some((gauge, mm)), Sought::Least) => {
+            (Some((site, mm)), SoughtGauge::Most) => self.add_gauge_at(site, mm),
+            (Some((gauge, mm)), SoughtGauge::Least) => {
                 self.tell(format!(
                     "Gauge {} helps least: without it {mm:.2} mm are expected. Delete removes it",
                     gauge + 1
                 ));
-                self.news.happened(Event::GaugeFound(gauge));
+                self.news.happened(Happening::GaugeFound(gauge));
             }
         }
     }
@@ -160,6 +160,6 @@ impl Session {
             "Gauge {} was put where it helps most: {mm:.2} mm are expected with it",
             gauge + 1
         ));
-        self.news.happened(Event::GaugeFound(gauge));
+        self.news.happened(Happening::GaugeFound(gauge));
     }
 }

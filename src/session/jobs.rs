@@ -206,7 +206,7 @@ pub fn duration(seconds: f32) -> String {
 
 /// How a job ended.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ended {
+pub struct JobEnd {
     pub name: String,
     pub how: String,
     pub failed: bool,
@@ -221,7 +221,7 @@ struct Failure {
 }
 
 /// A job that has ended: what is to be done, or why it cannot be.
-pub(super) struct Outcome<S> {
+pub(super) struct EndedJob<S> {
     pub task: Task,
     pub session: u64,
     pub inputs: Box<dyn Any + Send>,
@@ -231,7 +231,7 @@ pub(super) struct Outcome<S> {
 /// Everything that runs, the last of what has run, and what could not be computed, for an owner of this type.
 pub struct Jobs<S> {
     running: Vec<Running<S>>,
-    ended: Vec<Ended>,
+    ended: Vec<JobEnd>,
     failed: Vec<Failure>,
     wake: Wake,
     /// The session that jobs are started in.
@@ -305,7 +305,7 @@ impl<S: 'static> Jobs<S> {
 
     /// How those that have ended did so, the latest last.
     #[must_use]
-    pub fn ended(&self) -> &[Ended] {
+    pub fn ended(&self) -> &[JobEnd] {
         &self.ended
     }
 
@@ -383,7 +383,7 @@ impl<S: 'static> Jobs<S> {
     }
 
     fn remember(&mut self, r: &Running<S>, how: String, failed: bool) {
-        self.ended.push(Ended {
+        self.ended.push(JobEnd {
             name: r.job.name.clone(),
             how,
             failed,
@@ -395,7 +395,7 @@ impl<S: 'static> Jobs<S> {
     }
 
     /// Those that have ended since the last call.
-    pub(super) fn collect(&mut self) -> Vec<Outcome<S>> {
+    pub(super) fn collect(&mut self) -> Vec<EndedJob<S>> {
         let mut out = Vec::new();
         let mut k = 0;
         while k < self.running.len() {
@@ -415,7 +415,7 @@ impl<S: 'static> Jobs<S> {
                 job::Outcome::Failed(message) => self.remember(&r, message.clone(), true),
                 job::Outcome::Cancelled => self.remember(&r, "cancelled".into(), false),
             }
-            out.push(Outcome {
+            out.push(EndedJob {
                 task: r.task,
                 session: r.session,
                 inputs: r.inputs,

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::news::Event;
+use super::news::Happening;
 use super::state::Session;
 use crate::evaluation::{Chooser, Evaluation};
 use crate::placement::SelectorKind;
-use crate::project::{Kept, KeptError, KeptFailure};
+use crate::project::{KeptError, KeptFailure, KeptSelection};
 
 /// A selector's name as read by people.
 #[must_use]
@@ -16,7 +16,7 @@ pub fn chooser_title(selector: &str) -> &str {
 }
 
 impl Session {
-    /// Keeps the gauges as they are, with what is known of them; its name is said as [`Event::Kept`].
+    /// Keeps the gauges as they are, with what is known of them; its name is said as [`Happening::Kept`].
     pub fn keep(&mut self) {
         let project = &self.document.state.project;
         let sites = project.selection.sites.clone();
@@ -47,7 +47,7 @@ impl Session {
                 }
             };
         let quality = (self.results.design.as_ref()).map_or(self.quality(), |d| d.value.quality);
-        let kept = Kept {
+        let kept = KeptSelection {
             name: self.free_name(&format!("{}, {} gauges", chooser.title(), sites.len())),
             selector: chooser.name().into(),
             quality,
@@ -60,7 +60,7 @@ impl Session {
         let name = kept.name.clone();
         self.document.state.project.kept.push(kept);
         self.document.settle();
-        self.news.happened(Event::Kept(name));
+        self.news.happened(Happening::Kept(name));
     }
 
     /// Keeps one of them no longer, as one step of undo.

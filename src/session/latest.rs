@@ -16,7 +16,7 @@ pub struct Latest<Q, A> {
 }
 
 /// The thread's end.
-pub struct Desk<Q, A> {
+pub struct LatestDesk<Q, A> {
     inbox: Receiver<Q>,
     outbox: Sender<Reply<A>>,
     wake: Wake,
@@ -28,11 +28,11 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
     pub fn start(
         wake: &Wake,
         broken: &'static str,
-        serve: fn(Q, &Desk<Q, A>) -> Option<Q>,
+        serve: fn(Q, &LatestDesk<Q, A>) -> Option<Q>,
     ) -> Self {
         let (questions, inbox) = channel();
         let (outbox, replies) = channel();
-        let desk = Desk {
+        let desk = LatestDesk {
             inbox,
             outbox,
             wake: wake.clone(),
@@ -61,7 +61,7 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
     }
 }
 
-impl<Q, A> Desk<Q, A> {
+impl<Q, A> LatestDesk<Q, A> {
     pub fn answer(&self, reply: Reply<A>) {
         // Nobody listens any more when the session was closed meanwhile.
         let _ = self.outbox.send(reply);
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     /// Answers with the tens that a question shares with the first, and the question.
-    fn serve(first: u32, desk: &Desk<u32, (u32, u32)>) -> Option<u32> {
+    fn serve(first: u32, desk: &LatestDesk<u32, (u32, u32)>) -> Option<u32> {
         let tens = first / 10;
         let mut question = first;
         loop {
@@ -124,7 +124,7 @@ mod tests {
     fn only_the_latest_question_is_answered() {
         let (questions, inbox) = channel();
         let (outbox, _replies) = channel::<Reply<()>>();
-        let desk = Desk {
+        let desk = LatestDesk {
             inbox,
             outbox,
             wake: Wake::default(),

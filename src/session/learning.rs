@@ -7,15 +7,17 @@ use super::jobs::{Task, stop};
 use super::state::Session;
 use super::state::learned::Learnt;
 use crate::budget::Watch;
-use crate::design::{Candidates, Inputs, Learned, Outcome, PressLessons, Sensing, train_all};
+use crate::design::{
+    Inputs, Learned, PressLessons, Sensing, TrainingOutcome, TrialMethods, train_all,
+};
 use crate::io::bench_folder::limb_key;
 use crate::io::kept_model;
-use crate::io::touch_file::{self, Origin};
+use crate::io::touch_file::{self, TrainingOrigin};
 use crate::job::{Reporter, Stop};
-use crate::learning::{ByModel, Lessons, TrainingRequest};
+use crate::learning::{ByModel, MeasuredTouches, TrainingRequest};
 use crate::live::ShownEstimator;
-use crate::test_bed::{Collected, Wanted};
-use crate::uncertainty::Pressing;
+use crate::test_bed::{CollectedRun, Wanted};
+use crate::uncertainty::HandPressing;
 
 /// The ending of an estimator's file.
 pub const ESTIMATOR: &str = "hapdtouch";
@@ -32,7 +34,7 @@ impl Session {
         let work = move |r: &Reporter| {
             let watch = |p| r.report(p);
             let failed = |why: anyhow::Error| Stop::Failed(format!("{why:#}"));
-            let collected = Collected::read(&folder, Wanted::default()).map_err(failed)?;
+            let collected = CollectedRun::read(&folder, Wanted::default()).map_err(failed)?;
             let sensing = if let Some(sensing) = known {
                 sensing
             } else {
@@ -117,11 +119,11 @@ impl Session {
 
 /// What presses teach, with where that comes from, and why they teach the model nothing.
 fn learned(
-    collected: &Collected,
+    collected: &CollectedRun,
     inputs: &Inputs,
     sensing: &Sensing,
     watch: Watch,
-) -> Result<(Outcome, Origin, Option<String>), Stop> {
+) -> Result<(TrainingOutcome, TrainingOrigin, Option<String>), Stop> {
     let limb = limb_key(inputs);
     if collected.about.limb != limb {
         let what = "These presses are of another limb or other gauges: name the folder of this one";
@@ -129,15 +131,15 @@ fn learned(
     }
     let seed = inputs.project.budget.seed;
     let (data, groups) = collected.data();
-    let lessons = Lessons {
+    let lessons = MeasuredTouches {
         x: &data.x,
         places_mm: &data.targets,
         forces: &data.forces,
         groups: &groups,
     };
-    let presses = PressLessons::new(sensing, &inputs.project, &lessons, Pressing::EXACT);
+    let presses = PressLessons::new(sensing, &inputs.project, &lessons, HandPressing::EXACT);
     let untaught = presses.as_ref().err().map(ToString::to_string);
-    let candidates = Candidates {
+    let candidates = TrialMethods {
         regressions: true,
         model: presses.as_ref().ok().map(|p| (p, &ByModel::ALL[..])),
     };
@@ -152,10 +154,10 @@ fn learned(
             None => why.to_string(),
         }),
     })?;
-    let origin = Origin {
+    let origin = TrainingOrigin {
         limb: Some(limb),
         board: Some(collected.board.clone()).filter(|b| !b.is_empty()),
-        ..Origin::of(&outcome, &data, "presses", seed)
+        ..TrainingOrigin::of(&outcome, &data, "presses", seed)
     };
     Ok((outcome, origin, untaught))
 }

@@ -15,12 +15,12 @@ use std::sync::{Arc, Mutex};
 
 use super::desk::Desk;
 use super::jobs::{Task, stop};
-use super::news::Event;
+use super::news::Happening;
 use super::slot::{Slot, current};
 use super::state::Session;
 use super::state::live::Target;
 use crate::board::{
-    ChannelFault, Drawn, Faults, Illness, Script, SimulatedBoard, Truth, script_seed,
+    ChannelFault, Faults, Illness, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
 };
 use crate::design::simulated_board::{options, places, simulated};
 use crate::design::{Inputs, Sensing, Workshop};
@@ -32,7 +32,7 @@ use crate::link::{
     write_table,
 };
 use crate::live::{Pipeline, ShownEstimator};
-use feed::Shared;
+use feed::FeedShared;
 
 /// What may happen to a simulated board.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,7 +117,7 @@ impl Session {
         self.live.connection = None;
         self.live.hosted = None;
         self.live.target = None;
-        self.live.feed = Shared::default();
+        self.live.feed = FeedShared::default();
         self.show_estimator(self.desk.estimator);
     }
 
@@ -230,7 +230,7 @@ impl Session {
             Ok(connection) => {
                 self.live.connection = Some(connection);
                 self.live.applied = Some(live);
-                self.news.happened(Event::Connected);
+                self.news.happened(Happening::Connected);
             }
             Err(message) => self.complain(message),
         }
@@ -314,9 +314,9 @@ impl Session {
 fn board(inputs: &Inputs, sensing: &Sensing, r: &Reporter) -> Result<SimulatedBoard, Stop> {
     let seed = inputs.project.budget.seed;
     let places = places(inputs, sensing, seed).map_err(|e| stop(&e))?;
-    let script = Script::random(
+    let script = PressScript::random(
         places,
-        Drawn::usual(FORCES_N, inputs.project.making()),
+        RandomPresses::usual(FORCES_N, inputs.project.making()),
         script_seed(seed),
     );
     let made = simulated(

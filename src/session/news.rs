@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 /// Something to tell the user that stays until it is read.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Message {
+pub struct UserMessage {
     pub text: String,
     pub error: bool,
 }
 
 /// Something that has happened.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Event {
+pub enum Happening {
     /// Another project is open; a file that it came from, and whether that was what had been kept aside.
     Opened {
         file: Option<PathBuf>,
@@ -32,21 +32,21 @@ pub enum Event {
 
 /// Messages until they are read, and events until they are taken.
 #[derive(Debug, Default)]
-pub struct News {
-    pub messages: Vec<Message>,
-    events: Vec<Event>,
+pub struct SessionNews {
+    pub messages: Vec<UserMessage>,
+    events: Vec<Happening>,
 }
 
-impl News {
+impl SessionNews {
     pub fn tell(&mut self, text: impl Into<String>) {
-        self.messages.push(Message {
+        self.messages.push(UserMessage {
             text: text.into(),
             error: false,
         });
     }
 
     pub fn complain(&mut self, text: impl Into<String>) {
-        self.messages.push(Message {
+        self.messages.push(UserMessage {
             text: text.into(),
             error: true,
         });
@@ -64,12 +64,12 @@ impl News {
         self.messages.retain(|message| message.error);
     }
 
-    pub(super) fn happened(&mut self, event: Event) {
+    pub(super) fn happened(&mut self, event: Happening) {
         self.events.push(event);
     }
 
     /// What has happened since the last call, in its order.
-    pub fn take_events(&mut self) -> Vec<Event> {
+    pub fn take_events(&mut self) -> Vec<Happening> {
         std::mem::take(&mut self.events)
     }
 }

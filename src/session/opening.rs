@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::jobs::Task;
-use super::news::Event;
+use super::news::Happening;
 use super::shape::PartShape;
 use super::state::Session;
 use crate::design::Inputs;
-use crate::document::{Document, State};
+use crate::document::{Document, DocumentState};
 use crate::io::examples::Example;
 use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
@@ -23,7 +23,7 @@ pub struct Opened {
     document: Document,
     shape: PartShape,
     /// What was open when it was asked for: changes made since are not thrown away.
-    before: State,
+    before: DocumentState,
     /// What its user should know.
     said: Vec<String>,
     /// The file, where it belongs among the recent ones.
@@ -34,7 +34,7 @@ pub struct Opened {
 
 impl Opened {
     #[must_use]
-    pub fn new(loaded: LoadedProject, path: Option<PathBuf>, before: State) -> Self {
+    pub fn new(loaded: LoadedProject, path: Option<PathBuf>, before: DocumentState) -> Self {
         let document = Document::new(loaded, path);
         let body = document.state.project.part.body;
         let said = document.repairs.in_words(body);
@@ -65,7 +65,7 @@ impl Session {
     /// Reads a project in the background, and opens it when it is there.
     pub(super) fn open_with(
         &mut self,
-        read: impl FnOnce(State) -> Result<Opened, Stop> + Send + 'static,
+        read: impl FnOnce(DocumentState) -> Result<Opened, Stop> + Send + 'static,
     ) {
         let before = self.document.state.clone();
         self.jobs.start(
@@ -134,7 +134,7 @@ impl Session {
             let mut opened = Opened::new(loaded, path.clone(), before);
             opened.document.compare_with(match saved {
                 Some(saved) => Document::new(saved, path).state,
-                None => State {
+                None => DocumentState {
                     // Nothing on disk is this.
                     painted: None,
                     masks: crate::project::Masks::new(),
@@ -191,7 +191,7 @@ impl Session {
         if was_live {
             self.tell("The board was hung up: its readings were taken for the part that was open before. Connect again");
         }
-        self.news.happened(Event::Opened {
+        self.news.happened(Happening::Opened {
             file: opened.file,
             recovered: opened.recovered,
         });
@@ -202,7 +202,7 @@ impl Session {
 fn on_mesh(
     mesh: mesh_file::LoadedMesh,
     part: &TriMesh,
-    before: State,
+    before: DocumentState,
     mesh_path: PathBuf,
     path: Option<PathBuf>,
 ) -> Opened {
@@ -305,7 +305,7 @@ mod tests {
         assert!(s.desk.baud != BAUD && !s.desk.follow);
         let texts: Vec<&str> = s.news.messages.iter().map(|m| &*m.text).collect();
         assert!(texts.contains(&"stays to be read") && !texts.contains(&"the old part is done"));
-        let opened = Event::Opened {
+        let opened = Happening::Opened {
             file: None,
             recovered: false,
         };

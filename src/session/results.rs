@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::jobs::Task;
-use super::news::Event;
+use super::news::Happening;
 use super::slot::{Slot, current};
 use super::state::Session;
 use super::state::results::{DesignResult, SimulationResult};
@@ -46,7 +46,7 @@ impl Session {
             });
         }
         if first {
-            self.news.happened(Event::Designed);
+            self.news.happened(Happening::Designed);
         }
         self.follow_lead();
         // Gauges that undo has brought back may be those of this very design.
@@ -139,7 +139,7 @@ impl Session {
             } else {
                 self.document.adopt_sites(sites);
             }
-            self.news.happened(Event::GaugesReplaced);
+            self.news.happened(Happening::GaugesReplaced);
         }
         self.drive.take = true;
     }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::jobs::Task;
-use super::news::Event;
+use super::news::Happening;
 use super::state::Session;
 use crate::design::Design;
-use crate::document::State;
+use crate::document::DocumentState;
 use crate::io::artifacts::{self, Provenance};
 use crate::io::examples::write_bundled_mesh;
 use crate::io::project_file;
@@ -17,7 +17,7 @@ use crate::job::Stop;
 struct Saved {
     path: PathBuf,
     mesh: PathBuf,
-    state: State,
+    state: DocumentState,
 }
 
 impl Session {
@@ -49,7 +49,7 @@ impl Session {
         let session = self.jobs.session();
         self.jobs
             .start(Task::Save, session, work, |s, session, saved| {
-                s.news.happened(Event::Saved(saved.path.clone()));
+                s.news.happened(Happening::Saved(saved.path.clone()));
                 if s.jobs.session() == session {
                     s.document.saved_as(saved.path, saved.mesh, saved.state);
                 }

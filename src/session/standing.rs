@@ -3,8 +3,8 @@
 use super::jobs::Task;
 use super::state::Session;
 use crate::budget::Quality;
-use crate::design::Step;
-use crate::link::State;
+use crate::design::DesignStep;
+use crate::link::ConnectionState;
 
 /// Where no sites are left out as candidates, and what would leave some out.
 pub const NOBODY_REDUCES: &str = "Nobody asks for fewer: greedy SVR chooses among candidates, a judge by regression compares sets with all of them together, and a fixed number may be asked for";
@@ -81,13 +81,13 @@ impl Session {
                 self.standing_of(&Task::Simulate, self.simulation_holds(), held, None)
             }
             Stage::Feasible => self.feasible_standing(),
-            Stage::Candidates => self.design_standing(Step::Reduce),
-            Stage::Selection => self.design_standing(Step::Select),
-            Stage::Evaluation => self.design_standing(Step::Evaluate),
+            Stage::Candidates => self.design_standing(DesignStep::Reduce),
+            Stage::Selection => self.design_standing(DesignStep::Select),
+            Stage::Evaluation => self.design_standing(DesignStep::Evaluate),
             Stage::Bench => self.bench_standing(),
             Stage::Live => self.live_standing(),
             Stage::Report if self.results.design.is_none() => Standing::Open,
-            Stage::Report => match self.design_standing(Step::Evaluate) {
+            Stage::Report => match self.design_standing(DesignStep::Evaluate) {
                 Standing::Failed(_) | Standing::Running => Standing::Stale,
                 other => other,
             },
@@ -126,10 +126,10 @@ impl Session {
             {
                 Standing::Running
             }
-            Some(State::Live | State::Ended) => Standing::Current,
-            Some(State::Waiting) => Standing::Running,
-            Some(State::Silent) => Standing::Failed("the board has fallen silent".into()),
-            Some(State::Gone) => Standing::Failed("unplugged".into()),
+            Some(ConnectionState::Live | ConnectionState::Ended) => Standing::Current,
+            Some(ConnectionState::Waiting) => Standing::Running,
+            Some(ConnectionState::Silent) => Standing::Failed("the board has fallen silent".into()),
+            Some(ConnectionState::Gone) => Standing::Failed("unplugged".into()),
             None => Standing::Open,
         }
     }
@@ -149,7 +149,7 @@ impl Session {
         }
     }
 
-    fn design_standing(&self, step: Step) -> Standing {
+    fn design_standing(&self, step: DesignStep) -> Standing {
         let held = self.results.design.as_ref().map(|d| d.value.quality);
         self.standing_of(&Task::Design, self.design_holds(), held, Some(step))
     }
@@ -161,7 +161,7 @@ impl Session {
         task: &dyn Fn(Quality) -> Task,
         holds: Option<bool>,
         held: Option<Quality>,
-        step: Option<Step>,
+        step: Option<DesignStep>,
     ) -> Standing {
         let qualities = Quality::ALL;
         let running = qualities.iter().any(|&q| self.jobs.runs(task(q)));

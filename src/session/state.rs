@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 use super::desk::Desk;
 use super::jobs::Jobs;
-use super::news::News;
+use super::news::SessionNews;
 use super::shape::PartShape;
 use super::slot::Slot;
 use super::wake::Wake;
@@ -72,7 +72,7 @@ pub struct Session {
     pub drive: Drive,
     /// What stays when another project is opened.
     pub desk: Desk,
-    pub news: News,
+    pub news: SessionNews,
     /// Where to save once what is being saved is.
     pub(in crate::session) save_next: Option<PathBuf>,
     pub(in crate::session) wake: Wake,
@@ -98,7 +98,7 @@ impl Session {
             study: Study::default(),
             drive: Drive::default(),
             desk: Desk::default(),
-            news: News::default(),
+            news: SessionNews::default(),
             save_next: None,
             wake,
         }

@@ -11,7 +11,7 @@ use crate::io::opening;
 use crate::io::study_folder::StudyFolder;
 use crate::job::{Reporter, Stop};
 use crate::parameter_study::Points;
-use crate::varied::{Base, Collected};
+use crate::varied::{CollectedUnits, UnitBase};
 
 // As `map_err` hands it over.
 #[allow(clippy::needless_pass_by_value)]
@@ -31,12 +31,16 @@ impl Session {
             let watch = |p| r.report(p);
             let read = || -> anyhow::Result<OpenStudy> {
                 let folder = StudyFolder::open(&path)?;
-                let base = Base::new(&folder.study, &folder.home())?;
+                let base = UnitBase::new(&folder.study, &folder.home())?;
                 // Plans of before have no meshes.
                 let meshes = &folder.plan.meshes;
                 let same = base.fingerprint()? == folder.plan.base
                     && (meshes.is_empty() || base.meshes(&folder.study) == *meshes);
-                Ok(OpenStudy::new(Collected::of(folder, &watch)?, base, same))
+                Ok(OpenStudy::new(
+                    CollectedUnits::of(folder, &watch)?,
+                    base,
+                    same,
+                ))
             };
             read().map_err(failed)
         };

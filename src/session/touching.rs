@@ -3,7 +3,7 @@
 use super::latest::Latest;
 use super::slot::Slot;
 use super::state::Session;
-use super::state::touching::{BROKEN, Request, serve};
+use super::state::touching::{BROKEN, TouchRequest, serve};
 use crate::elasticity::Touch;
 use crate::mesh::SurfacePoint;
 
@@ -12,7 +12,7 @@ impl Session {
     pub fn press(&mut self, at: SurfacePoint) {
         let project = &self.document.state.project;
         let (force, tip_radius) = project.tip();
-        let request = Request {
+        let request = TouchRequest {
             model: self.document.model_inputs(),
             inputs: self.document.inputs(),
             touch: Touch {

@@ -5,14 +5,14 @@ use std::sync::{Arc, Mutex};
 
 use super::jobs::{Task, duration, stop};
 use super::state::Session;
-use super::state::trade::Place;
+use super::state::trade::MeasuredOn;
 use crate::budget::{Progress, Quality};
 use crate::design::{Finest, Inputs};
-use crate::io::trade_file::{Judge, Record};
+use crate::io::trade_file::{TradeJudge, TradeRecord};
 use crate::io::{ProcessMeter, atomic};
 use crate::job::{Reporter, Stop};
 use crate::project::Project;
-use crate::trade::{Knob, Measured, Point, Setting, Sweep, clock, measure, standards};
+use crate::trade::{Knob, Measured, Sweep, TradePoint, TradeSetting, clock, measure, standards};
 
 /// The trade of the bundled limb, measured where this program was made.
 const BUNDLED: &str = include_str!("../../assets/trade/trade.json");
@@ -34,13 +34,17 @@ impl Session {
         let snapshot = self.document.inputs();
         let home = self.desk.trades.as_deref();
         let kept = home.and_then(|home| kept(home, &snapshot));
-        let bundled = || Record::parse(BUNDLED).ok().filter(|r| r.is_of(&snapshot));
+        let bundled = || {
+            TradeRecord::parse(BUNDLED)
+                .ok()
+                .filter(|r| r.is_of(&snapshot))
+        };
         let trade = &mut self.caches.trade;
         trade.inputs = Some(inputs);
         trade.promise = None;
         trade.record = kept
-            .map(|record| (Arc::new(record), Place::Here))
-            .or_else(|| bundled().map(|record| (Arc::new(record), Place::Elsewhere)));
+            .map(|record| (Arc::new(record), MeasuredOn::Here))
+            .or_else(|| bundled().map(|record| (Arc::new(record), MeasuredOn::Elsewhere)));
     }
 
     /// Takes in what a measurement had when it was ended.
@@ -53,7 +57,7 @@ impl Session {
         if let Some(record) = ended
             && record.is_of(&self.document.inputs())
         {
-            self.caches.trade.record = Some((Arc::new(record), Place::Here));
+            self.caches.trade.record = Some((Arc::new(record), MeasuredOn::Here));
         }
     }
 
@@ -62,7 +66,7 @@ impl Session {
         let project = &self.document.state.project;
         let (record, _) = self.caches.trade.record.as_ref()?;
         let limits = project.budget.limits_at(quality);
-        let is_it = |p: &&Point| p.setting.is_at(project, quality, &limits);
+        let is_it = |p: &&TradePoint| p.setting.is_at(project, quality, &limits);
         record.points.iter().find(is_it)?.measured()
     }
 
@@ -81,7 +85,7 @@ impl Session {
 
     /// Whether what is known was measured with the bundled limb, where this program was made.
     pub(super) fn is_from_elsewhere(&self) -> bool {
-        matches!(self.caches.trade.record, Some((_, Place::Elsewhere)))
+        matches!(self.caches.trade.record, Some((_, MeasuredOn::Elsewhere)))
     }
 
     /// Seconds by the clock here a processor second where it was measured.
@@ -97,7 +101,7 @@ impl Session {
 
     /// What is measured, what is being measured included.
     #[must_use]
-    pub fn measured_points(&self) -> Vec<Point> {
+    pub fn measured_points(&self) -> Vec<TradePoint> {
         let trade = &self.caches.trade;
         let running = self.measures_this();
         let coming = trade.coming.lock().ok().filter(|_| running);
@@ -114,10 +118,10 @@ impl Session {
     pub fn trade_in_words(&self) -> String {
         match &self.caches.trade.record {
             _ if self.jobs.runs(Task::Trade) => "Being measured".to_owned(),
-            Some((r, Place::Here)) => {
+            Some((r, MeasuredOn::Here)) => {
                 format!("{} settings measured on this machine", r.points.len())
             }
-            Some((r, Place::Elsewhere)) => format!(
+            Some((r, MeasuredOn::Elsewhere)) => format!(
                 "{} settings, measured where this program was made",
                 r.points.len()
             ),
@@ -156,9 +160,9 @@ impl Session {
         let snapshot = self.document.inputs();
         let threads = rayon::current_num_threads();
         let here = self.caches.trade.record.as_ref();
-        let here = here.filter(|r| r.1 == Place::Here && r.0.is_of(&snapshot));
-        let record = here.map_or_else(|| Record::new(&snapshot, threads), |r| (*r.0).clone());
-        let coming = Arc::<Mutex<Option<Record>>>::default();
+        let here = here.filter(|r| r.1 == MeasuredOn::Here && r.0.is_of(&snapshot));
+        let record = here.map_or_else(|| TradeRecord::new(&snapshot, threads), |r| (*r.0).clone());
+        let coming = Arc::<Mutex<Option<TradeRecord>>>::default();
         self.caches.trade.coming = Arc::clone(&coming);
         let home = self.desk.trades.clone();
         let work = move |r: &Reporter| sweep(&snapshot, record, count, home.as_deref(), &coming, r);
@@ -167,16 +171,16 @@ impl Session {
             .start(Task::Trade, inputs, work, |s, inputs, record| {
                 if s.caches.trade.inputs.as_ref() == Some(&inputs) {
                     s.desk.pace = 1.0;
-                    s.caches.trade.record = Some((Arc::new(record), Place::Here));
+                    s.caches.trade.record = Some((Arc::new(record), MeasuredOn::Here));
                 }
             });
     }
 }
 
 /// What an earlier run has kept of these inputs.
-fn kept(home: &Path, inputs: &Inputs) -> Option<Record> {
+fn kept(home: &Path, inputs: &Inputs) -> Option<TradeRecord> {
     let text = std::fs::read_to_string(file(home, inputs)).ok()?;
-    let record = Record::parse(&text).ok()?;
+    let record = TradeRecord::parse(&text).ok()?;
     let threads = rayon::current_num_threads();
     (record.is_of(inputs) && record.threads == threads).then_some(record)
 }
@@ -190,7 +194,7 @@ fn file(home: &Path, inputs: &Inputs) -> PathBuf {
 
 /// Qualities that are measured by their names: at Standard regressions alone would take a quarter of an hour.
 fn qualities(project: &Project) -> Vec<Quality> {
-    if Setting::centre(project).uses(Knob::Folds) {
+    if TradeSetting::centre(project).uses(Knob::Folds) {
         vec![Quality::Draft]
     } else {
         standards()
@@ -200,19 +204,19 @@ fn qualities(project: &Project) -> Vec<Quality> {
 /// Measures until so many points are known. What there is when it is ended is kept on disk and in `coming`.
 fn sweep(
     inputs: &Inputs,
-    mut record: Record,
+    mut record: TradeRecord,
     count: usize,
     home: Option<&Path>,
-    coming: &Mutex<Option<Record>>,
+    coming: &Mutex<Option<TradeRecord>>,
     r: &Reporter,
-) -> Result<Record, Stop> {
-    let show = |record: &Record| {
+) -> Result<TradeRecord, Stop> {
+    let show = |record: &TradeRecord| {
         if let Ok(mut coming) = coming.lock() {
             *coming = Some(record.clone());
         }
     };
     let walk = Sweep::new(&inputs.project, qualities(&inputs.project));
-    let left = |record: &Record| count.saturating_sub(record.points.len());
+    let left = |record: &TradeRecord| count.saturating_sub(record.points.len());
     if walk.next(&record.points, left(&record)).is_none() {
         return Err(Stop::Failed(format!(
             "all {} settings are measured already. Ask for more of them",
@@ -226,7 +230,7 @@ fn sweep(
         })
     };
     let judge = Finest::new(inputs, &laying).map_err(|e| stop(&e))?;
-    record.judge = Judge {
+    record.judge = TradeJudge {
         element_mm: judge.element_mm(),
         unknowns: judge.unknowns(),
         touches: judge.touches(),

@@ -6,14 +6,14 @@ use glam::DVec3;
 
 use super::commands::UiCommand;
 use super::nudge::next_site;
-use super::view::{Picture, View, Way};
+use super::view::{Picture, ScreenWay, ViewState};
 use crate::document::{Brush, Layer};
 use crate::io::examples::Example;
 use crate::link::BenchOrder;
 use crate::mesh::SurfacePoint;
 use crate::project::{ChosenSite, Project, Unit};
 use crate::session::{Desk, Ends, Mishap, Session, Task};
-use crate::trade::{Setting, TradeConstraint};
+use crate::trade::{TradeConstraint, TradeSetting};
 
 /// Something to be done.
 pub enum Action {
@@ -22,7 +22,7 @@ pub enum Action {
     Edit(Box<Project>),
     /// What follows a hand that is still at work.
     Hand(HandAction),
-    Change(Change),
+    Change(ProjectChange),
     History(History),
     Compute(Compute),
     File(FileAction),
@@ -60,17 +60,17 @@ pub enum HandAction {
 }
 
 /// A change of the project.
-pub enum Change {
+pub enum ProjectChange {
     Layer(Layer, LayerChange),
     AddPaintedSupport,
     PinGauges(Vec<usize>),
     RemoveGauges(Vec<usize>),
     /// One step that way on the screen, as this view shows the part.
-    NudgeGauges(Vec<usize>, Way, Box<View>),
+    NudgeGauges(Vec<usize>, ScreenWay, Box<ViewState>),
     UseGauges(Vec<ChosenSite>),
     Keep,
     DeleteKept(usize),
-    ApplySetting(Box<Setting>),
+    ApplySetting(Box<TradeSetting>),
     AskFor(TradeConstraint),
 }
 
@@ -244,7 +244,7 @@ impl HandAction {
     }
 }
 
-impl Change {
+impl ProjectChange {
     fn apply(self, session: &mut Session) {
         match self {
             Self::Layer(layer, change) => change.apply(session, layer),
@@ -359,8 +359,8 @@ impl From<HandAction> for Action {
     }
 }
 
-impl From<Change> for Action {
-    fn from(action: Change) -> Self {
+impl From<ProjectChange> for Action {
+    fn from(action: ProjectChange) -> Self {
         Self::Change(action)
     }
 }
@@ -429,10 +429,10 @@ mod tests {
             &|_| HandAction::Mark(Layer::KeepOut, Brush::Paint, vec![1, 2, 3]).into(),
             &|_| HandAction::PutGauge(0, site.clone()).into(),
             &|_| HandAction::AddGauge(site.clone()).into(),
-            &|_| Change::Layer(Layer::KeepOut, LayerChange::Fill).into(),
-            &|_| Change::PinGauges(vec![0]).into(),
-            &|_| Change::UseGauges(vec![site.clone()]).into(),
-            &|_| Change::Keep.into(),
+            &|_| ProjectChange::Layer(Layer::KeepOut, LayerChange::Fill).into(),
+            &|_| ProjectChange::PinGauges(vec![0]).into(),
+            &|_| ProjectChange::UseGauges(vec![site.clone()]).into(),
+            &|_| ProjectChange::Keep.into(),
         ];
         for (k, action) in actions.iter().enumerate() {
             let mut session = opened();

@@ -4,20 +4,20 @@ use egui::{Button, Ui};
 
 use super::action::{Action, WindowAction};
 use super::commands::{UiCommand, enabled, is_on, why_not};
-use super::view::View;
+use super::view::ViewState;
 use crate::project::Project;
 use crate::session::{Desk, Session};
 
 /// A panel's side of the window.
 pub struct Ask<'a> {
     pub session: &'a Session,
-    pub view: &'a mut View,
+    pub view: &'a mut ViewState,
     actions: Vec<Action>,
 }
 
 impl<'a> Ask<'a> {
     /// A side on which nothing is asked for yet.
-    pub fn new(session: &'a Session, view: &'a mut View) -> Self {
+    pub fn new(session: &'a Session, view: &'a mut ViewState) -> Self {
         Self {
             session,
             view,
@@ -131,7 +131,7 @@ mod tests {
     fn forms_of_one_frame_add_up_and_one_that_changes_nothing_asks_for_nothing() {
         let document = Document::new(bundled().unwrap(), None);
         let mut session = Session::new(document, Wake::default());
-        let mut view = View::of(&session.document);
+        let mut view = ViewState::of(&session.document);
         let mut ask = Ask::new(&session, &mut view);
         ask.edit(|_| ());
         ask.edit_desk(|desk| desk.baud += 0);

@@ -2,7 +2,7 @@
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-use super::view::{Stage, Tool, View, Way};
+use super::view::{ScreenWay, Stage, Tool, ViewState};
 use crate::document::Layer;
 use crate::io::examples::Example;
 use crate::render::camera::Preset;
@@ -49,7 +49,7 @@ pub enum UiCommand {
     RemoveGauges,
     AddHelpful,
     FindSpare,
-    Nudge(Way),
+    Nudge(ScreenWay),
     Frame,
     FramePicked,
     SeeThrough,
@@ -108,10 +108,10 @@ impl UiCommand {
             Self::RemoveGauges => "Remove picked gauges",
             Self::AddHelpful => "Add the gauge that helps most",
             Self::FindSpare => "Find the gauge that helps least",
-            Self::Nudge(Way::Left) => "Move picked gauges left",
-            Self::Nudge(Way::Right) => "Move picked gauges right",
-            Self::Nudge(Way::Up) => "Move picked gauges up",
-            Self::Nudge(Way::Down) => "Move picked gauges down",
+            Self::Nudge(ScreenWay::Left) => "Move picked gauges left",
+            Self::Nudge(ScreenWay::Right) => "Move picked gauges right",
+            Self::Nudge(ScreenWay::Up) => "Move picked gauges up",
+            Self::Nudge(ScreenWay::Down) => "Move picked gauges down",
             Self::Frame => "Frame the limb",
             Self::FramePicked => "Frame picked gauges",
             Self::SeeThrough => "See-through",
@@ -279,10 +279,10 @@ impl UiCommand {
             Self::RemoveGauges => plain(Key::Delete),
             Self::AddHelpful => plain(Key::A),
             Self::FindSpare => plain(Key::W),
-            Self::Nudge(Way::Left) => plain(Key::ArrowLeft),
-            Self::Nudge(Way::Right) => plain(Key::ArrowRight),
-            Self::Nudge(Way::Up) => plain(Key::ArrowUp),
-            Self::Nudge(Way::Down) => plain(Key::ArrowDown),
+            Self::Nudge(ScreenWay::Left) => plain(Key::ArrowLeft),
+            Self::Nudge(ScreenWay::Right) => plain(Key::ArrowRight),
+            Self::Nudge(ScreenWay::Up) => plain(Key::ArrowUp),
+            Self::Nudge(ScreenWay::Down) => plain(Key::ArrowDown),
             Self::Frame => plain(Key::Home),
             Self::FramePicked => plain(Key::Period),
             Self::SeeThrough => plain(Key::H),
@@ -378,7 +378,7 @@ impl UiCommand {
             Self::SmallerText,
         ];
         all.extend(Example::ALL.map(Self::Example));
-        all.extend(Way::ALL.map(Self::Nudge));
+        all.extend(ScreenWay::ALL.map(Self::Nudge));
         all.extend(Preset::ALL.map(Self::Look));
         all.extend(Tool::ALL.map(Self::Tool));
         all.extend(Layer::ALL.map(Self::Paint));
@@ -389,7 +389,7 @@ impl UiCommand {
 
 /// Whether a command can be given now.
 #[must_use]
-pub fn enabled(session: &Session, view: &View, command: UiCommand) -> bool {
+pub fn enabled(session: &Session, view: &ViewState, command: UiCommand) -> bool {
     match command {
         UiCommand::Undo => session.document.can_undo(),
         UiCommand::Redo => session.document.can_redo(),
@@ -435,7 +435,7 @@ pub fn why_not(session: &Session, command: UiCommand) -> &'static str {
 
 /// Whether a command that turns something on or off has it on.
 #[must_use]
-pub fn is_on(session: &Session, view: &View, command: UiCommand) -> bool {
+pub fn is_on(session: &Session, view: &ViewState, command: UiCommand) -> bool {
     match command {
         UiCommand::Follow => session.desk.follow,
         UiCommand::SeeThrough => view.see_through,

@@ -5,13 +5,13 @@ use glam::DVec3;
 
 use super::action::WindowAction;
 use super::ask::Ask;
-use super::paint::{Look, empty, label};
+use super::paint::{LimbLook, empty, label};
 use super::view::{Field, Pane, Tab};
-use crate::placement::expected_error::Pair;
-use crate::session::Taken;
+use crate::placement::expected_error::MistakenPair;
+use crate::session::TakenFor;
 
 /// The worst pairs as lines, and what the place that is pointed at is taken for.
-pub fn paint_confusions(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_confusions(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     if look.view.field != Field::Expected && look.view.tab != Tab::Confusions {
         return;
     }
@@ -29,7 +29,13 @@ pub fn paint_confusions(look: Look<'_>, painter: &Painter, pane: Pane) {
     }
 }
 
-fn paint_pair(look: Look<'_>, painter: &Painter, pane: Pane, pair: &Pair, looked_at: bool) {
+fn paint_pair(
+    look: LimbLook<'_>,
+    painter: &Painter,
+    pane: Pane,
+    pair: &MistakenPair,
+    looked_at: bool,
+) {
     let place = |mm: DVec3| look.place_in(pane, mm / 1000.0);
     let (Some(from), Some(to)) = (place(pair.from_mm), place(pair.taken.place_mm)) else {
         return;
@@ -45,7 +51,7 @@ fn paint_pair(look: Look<'_>, painter: &Painter, pane: Pane, pair: &Pair, looked
     }
 }
 
-fn paint_mistaken(look: Look<'_>, painter: &Painter, pane: Pane, answer: &Taken) {
+fn paint_mistaken(look: LimbLook<'_>, painter: &Painter, pane: Pane, answer: &TakenFor) {
     let Some(here) = look.place_in(pane, answer.place) else {
         return;
     };
@@ -92,7 +98,7 @@ pub fn confusions_tab(ask: &mut Ask<'_>, ui: &mut Ui) {
 }
 
 /// All of them; which was clicked.
-fn confusion_table(ask: &Ask<'_>, ui: &mut Ui, pairs: &[Pair]) -> Option<usize> {
+fn confusion_table(ask: &Ask<'_>, ui: &mut Ui, pairs: &[MistakenPair]) -> Option<usize> {
     const TITLES: [&str; 5] = [
         "Number",
         "Apart (mm)",
@@ -125,7 +131,7 @@ fn confusion_table(ask: &Ask<'_>, ui: &mut Ui, pairs: &[Pair]) -> Option<usize> 
 }
 
 /// One confusion; whether it was clicked.
-fn confusion_row(ask: &Ask<'_>, ui: &mut Ui, k: usize, pair: &Pair) -> bool {
+fn confusion_row(ask: &Ask<'_>, ui: &mut Ui, k: usize, pair: &MistakenPair) -> bool {
     let chosen = ask.view.looked_at == Some(k);
     let button = ui
         .add(egui::Button::selectable(chosen, format!("{}", k + 1)))

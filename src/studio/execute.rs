@@ -3,14 +3,14 @@
 use egui::{Context, Theme, ViewportCommand};
 
 use super::action::{
-    Action, BenchAction, BoardAction, Change, Compute, FileAction, History, LayerChange,
+    Action, BenchAction, BoardAction, Compute, FileAction, History, LayerChange, ProjectChange,
 };
 use super::ask::Ask;
 use super::commands::{UiCommand, needs_part};
 use super::dialogs::Dialog;
 use super::layout::Panels;
 use super::palette::Palette;
-use super::scene::Scene;
+use super::scene::PartScene;
 use super::view::{Gesture, Stage, Tab, Tool};
 use crate::link::BenchOrder;
 
@@ -24,7 +24,7 @@ pub fn execute(
     command: UiCommand,
     ctx: &Context,
     ask: &mut Ask<'_>,
-    scene: &Scene,
+    scene: &PartScene,
     panels: &mut Panels,
 ) {
     if !ask.enabled(command) {
@@ -82,7 +82,7 @@ fn open_panel(command: UiCommand, ask: &mut Ask<'_>, panels: &mut Panels) {
 }
 
 /// What a command changes of how the session is looked at.
-fn look_at(command: UiCommand, ask: &mut Ask<'_>, scene: &Scene) {
+fn look_at(command: UiCommand, ask: &mut Ask<'_>, scene: &PartScene) {
     let (session, view) = (ask.session, &mut *ask.view);
     match command {
         UiCommand::WiderBrush => view.brush *= BRUSH_STEP,
@@ -122,7 +122,7 @@ fn look_at(command: UiCommand, ask: &mut Ask<'_>, scene: &Scene) {
 /// What a command asks of the session.
 fn asked_of_session(command: UiCommand, ask: &mut Ask<'_>, panels: &Panels) -> Option<Action> {
     let view = &mut *ask.view;
-    let paint = |change: LayerChange| Change::Layer(view.layer, change);
+    let paint = |change: LayerChange| ProjectChange::Layer(view.layer, change);
     let by = view.brush / 4.0;
     Some(match command {
         UiCommand::Undo => History::Undo.into(),
@@ -133,13 +133,15 @@ fn asked_of_session(command: UiCommand, ask: &mut Ask<'_>, panels: &Panels) -> O
         UiCommand::InvertPaint => paint(LayerChange::Invert).into(),
         UiCommand::GrowPaint => paint(LayerChange::Grow(by)).into(),
         UiCommand::ShrinkPaint => paint(LayerChange::Shrink(by)).into(),
-        UiCommand::Pin => Change::PinGauges(view.picked.clone()).into(),
-        UiCommand::RemoveGauges => Change::RemoveGauges(std::mem::take(&mut view.picked)).into(),
+        UiCommand::Pin => ProjectChange::PinGauges(view.picked.clone()).into(),
+        UiCommand::RemoveGauges => {
+            ProjectChange::RemoveGauges(std::mem::take(&mut view.picked)).into()
+        }
         UiCommand::Nudge(way) => {
             let seen = Box::new(view.clone());
-            Change::NudgeGauges(view.picked.clone(), way, seen).into()
+            ProjectChange::NudgeGauges(view.picked.clone(), way, seen).into()
         }
-        UiCommand::Keep => Change::Keep.into(),
+        UiCommand::Keep => ProjectChange::Keep.into(),
         UiCommand::Simulate => Compute::Simulate.into(),
         UiCommand::Select => Compute::Select.into(),
         UiCommand::AddHelpful => Compute::AddHelpful.into(),

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::view::{Field, View};
+use super::view::{Field, ViewState};
 use crate::colormap::ColorMap;
 use crate::document::{Layer, PaintInputs, WallInputs};
 use crate::elasticity::support::held_freedoms;
 use crate::feasible::Feasibility;
 use crate::mesh::flatten::Flat;
-use crate::mesh::walls::Side;
+use crate::mesh::walls::WallSide;
 use crate::plain::{robust_top, round_up};
 use crate::project::Project;
 use crate::render::gpu::Shown;
@@ -26,7 +26,7 @@ struct RegionInputs {
 
 /// What a field was built from.
 #[derive(Clone, PartialEq)]
-struct FieldInputs {
+struct BuiltFrom {
     field: Field,
     range: Option<(f64, f64)>,
     /// Counts touches, and results of the project.
@@ -57,9 +57,9 @@ struct OfWalls {
 }
 
 /// A field ready to be shown, and the legend that goes with it.
-pub struct Built {
+pub struct BuiltField {
     /// What the field and the regions were built from.
-    field: FieldInputs,
+    field: BuiltFrom,
     region: RegionInputs,
     pub shown: Arc<Vec<Shown>>,
     /// The same for the unrolled part when that is shown, and what it was made from.
@@ -95,17 +95,17 @@ fn rising(title: &str, top: f64) -> Legend {
     legend(title, [0.0, top], ColorMap::Viridis)
 }
 
-impl Built {
+impl BuiltField {
     /// What is shown a vertex, made anew where anything it depends on has changed since the last; of the unrolled part
     /// too where that is shown.
     #[must_use]
-    pub fn of(last: Option<Self>, flat: &Flat, session: &Session, view: &View) -> Self {
-        let mut built = Self::coloured(last, Source { session, view });
+    pub fn of(last: Option<Self>, flat: &Flat, session: &Session, view: &ViewState) -> Self {
+        let mut built = Self::coloured(last, FieldSource { session, view });
         built.flat = view.unrolled_shown.then(|| built.laid_flat(flat));
         built
     }
 
-    fn coloured(last: Option<Self>, source: Source<'_>) -> Self {
+    fn coloured(last: Option<Self>, source: FieldSource<'_>) -> Self {
         let (field, region) = (source.field_inputs(), source.region_inputs());
         match last {
             Some(built) if built.field == field && built.region == region => built,
@@ -149,17 +149,17 @@ impl Built {
 
 /// What fields are made of.
 #[derive(Clone, Copy)]
-struct Source<'a> {
+struct FieldSource<'a> {
     session: &'a Session,
-    view: &'a View,
+    view: &'a ViewState,
 }
 
-impl<'a> Source<'a> {
+impl<'a> FieldSource<'a> {
     fn project(&self) -> &'a Project {
         &self.session.document.state.project
     }
 
-    fn field_inputs(&self) -> FieldInputs {
+    fn field_inputs(&self) -> BuiltFrom {
         let field = self.view.field;
         let of_field = match field {
             Field::Region | Field::Strain | Field::Displacement => OfField::Nothing,
@@ -180,7 +180,7 @@ impl<'a> Source<'a> {
                 paint: self.session.document.paint_inputs(),
             })),
         };
-        FieldInputs {
+        BuiltFrom {
             field,
             range: self.view.ranges.of(field),
             touch: self.session.caches.touching.version,
@@ -345,10 +345,10 @@ impl<'a> Source<'a> {
         if faces.sides.len() != self.session.document.part.positions().len() {
             return None;
         }
-        let of_side = |side: &Side| match side {
-            Side::Outside => -1.0,
-            Side::Rim | Side::Frame => 0.0,
-            Side::Inside => 1.0,
+        let of_side = |side: &WallSide| match side {
+            WallSide::Outside => -1.0,
+            WallSide::Rim | WallSide::Frame => 0.0,
+            WallSide::Inside => 1.0,
         };
         Some(if sides {
             let mut values: Vec<f64> = faces.sides.iter().map(of_side).collect();

@@ -3,7 +3,7 @@
 use egui::{Color32, Painter, Pos2, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
-use super::paint::Look;
+use super::paint::LimbLook;
 use super::view::Pane;
 use crate::jig::{JigFrame, Stack, bar, outline};
 
@@ -13,7 +13,7 @@ const INKS: [[u8; 3]; 3] = [[0xd8, 0xdc, 0xe2], [0xf0, 0xc4, 0x8f], [0x9c, 0xc9,
 const COVER: f32 = 0.82;
 
 /// Draws it on the limb, where it is asked for and planned.
-pub fn paint_jig(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_jig(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     if !look.view.jig_shown || pane != Pane::Limb {
         return;
     }
@@ -42,7 +42,12 @@ pub fn paint_jig(look: Look<'_>, painter: &Painter, pane: Pane) {
 }
 
 /// The outline of a body on the screen, and how near it is; nothing of one that is not all before the eye, or is cut away.
-fn seen(look: Look<'_>, stack: &Stack, body: &[DVec3], toward: DVec3) -> Option<(f64, Vec<Pos2>)> {
+fn seen(
+    look: LimbLook<'_>,
+    stack: &Stack,
+    body: &[DVec3],
+    toward: DVec3,
+) -> Option<(f64, Vec<Pos2>)> {
     let frame: &JigFrame = &stack.frame;
     let places: Vec<DVec3> = body.iter().map(|&p| frame.out_of(p)).collect();
     let middle = places.iter().sum::<DVec3>() / places.len().max(1) as f64;

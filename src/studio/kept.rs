@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use egui::{Color32, Painter, Stroke, TextEdit, Ui, vec2};
 use glam::DVec3;
 
-use super::action::Change;
+use super::action::ProjectChange;
 use super::ask::Ask;
-use super::paint::{Look, empty};
+use super::paint::{LimbLook, empty};
 use super::theme::kept_colour;
 use super::view::Pane;
 use crate::evaluation::EVERYWHERE;
-use crate::project::Kept;
+use crate::project::KeptSelection;
 use crate::session::chooser_title;
 
 /// The tab: what is kept, side by side.
@@ -59,17 +59,17 @@ pub fn compare_tab(ask: &mut Ask<'_>, ui: &mut Ui) {
         KeptAction::None => {}
         KeptAction::Use(k) => {
             let sites = ask.project().kept[k].sites.clone();
-            ask.act(Change::UseGauges(sites));
+            ask.act(ProjectChange::UseGauges(sites));
         }
         KeptAction::Delete(k) => {
             // Its name stays among those shown: when the deletion is taken back, so is this.
-            ask.act(Change::DeleteKept(k));
+            ask.act(ProjectChange::DeleteKept(k));
         }
     }
 }
 
 /// The sites of the kept selections that are shown, as rhombs.
-pub fn paint_kept(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_kept(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     let toward = look.view.camera.toward_eye();
     for (k, kept) in look.view.compared(look.project()) {
         for site in &kept.sites {
@@ -101,7 +101,7 @@ enum KeptAction {
 fn kept_row(
     ui: &mut Ui,
     k: usize,
-    kept: &mut Kept,
+    kept: &mut KeptSelection,
     shown: &mut BTreeSet<String>,
     asked: &mut KeptAction,
 ) {

@@ -6,7 +6,7 @@ use super::ask::Ask;
 use super::bench;
 use super::dialogs::Dialogs;
 use super::live::LiveForm;
-use super::paint::Look;
+use super::paint::LimbLook;
 use super::palette::{self, Palette};
 use super::recovery::Recovery;
 use super::study::StudyView;
@@ -81,7 +81,7 @@ impl Panels {
 }
 
 /// Draws the views, after all that happened in either: what is hovered in one shows in the other.
-pub fn draw(look: Look<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
+pub fn draw(look: LimbLook<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
     for &(pane, rect) in panes {
         match pane {
             Pane::Limb => overlay::paint_limb(look, ui, rect, false),
@@ -95,7 +95,7 @@ pub fn draw(look: Look<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
     }
 }
 
-fn draw_over(look: Look<'_>, ui: &Ui, pane: Pane, rect: Rect) {
+fn draw_over(look: LimbLook<'_>, ui: &Ui, pane: Pane, rect: Rect) {
     let painter = &ui.painter_at(rect);
     jig::paint_jig(look, painter, pane);
     bench::paint_bench(look, painter, pane);
@@ -117,7 +117,7 @@ fn draw_over(look: Look<'_>, ui: &Ui, pane: Pane, rect: Rect) {
 }
 
 /// The limb with all that belongs to it, for a picture.
-pub fn picture(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
+pub fn picture(look: LimbLook<'_>, ui: &Ui, rect: Rect, transparent: bool) {
     overlay::paint_limb(look, ui, rect, transparent);
     let painter = &ui.painter_at(rect);
     jig::paint_jig(look, painter, Pane::Limb);

@@ -2,7 +2,7 @@
 
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2, vec2};
 
-use super::paint::{Look, label, plate};
+use super::paint::{LimbLook, label, plate};
 use super::view::{Field, Tool};
 use crate::colormap::ColorMap;
 use crate::document::Layer;
@@ -11,7 +11,7 @@ use crate::document::Layer;
 const BLIND_KEY: Color32 = Color32::from_gray(150);
 
 /// The scale of the colours.
-pub fn paint_legend(look: Look<'_>, painter: &Painter, rect: Rect) {
+pub fn paint_legend(look: LimbLook<'_>, painter: &Painter, rect: Rect) {
     let mut bottom = rect.bottom() - 16.0;
     if let Some(scale) = look.exaggeration() {
         let text = format!("Deformation × {scale}");
@@ -70,7 +70,7 @@ pub fn paint_legend(look: Look<'_>, painter: &Painter, rect: Rect) {
 }
 
 /// What to do next with the tool in hand.
-pub fn paint_hint(look: Look<'_>, painter: &Painter, rect: Rect) {
+pub fn paint_hint(look: LimbLook<'_>, painter: &Painter, rect: Rect) {
     let text = match look.view.tool {
         _ if look.session.caches.touching.is_waiting() => "Computing the touch …",
         Tool::Paint => {
@@ -110,7 +110,7 @@ const TOUCHES_COME: Color32 = Color32::from_rgb(128, 153, 230);
 const BESIDE_OFTEN: Color32 = Color32::from_rgb(165, 178, 216);
 
 /// What the colours of the regions mean, of those that are there.
-pub fn paint_region_key(look: Look<'_>, painter: &Painter, rect: Rect) {
+pub fn paint_region_key(look: LimbLook<'_>, painter: &Painter, rect: Rect) {
     if look.view.field == Field::Faces && look.scene.shows_field() {
         return face_key(painter, rect);
     }
@@ -147,7 +147,7 @@ pub fn paint_region_key(look: Look<'_>, painter: &Painter, rect: Rect) {
 }
 
 /// Under the unrolled view: what became of lengths there.
-pub fn paint_stretch(look: Look<'_>, painter: &Painter, rect: Rect) {
+pub fn paint_stretch(look: LimbLook<'_>, painter: &Painter, rect: Rect) {
     let words = look.scene.unrolled.flat.stretch.words();
     let room = rect.width() - 40.0;
     let font = FontId::proportional(12.5);
@@ -157,7 +157,7 @@ pub fn paint_stretch(look: Look<'_>, painter: &Painter, rect: Rect) {
 }
 
 /// What is missing before a field can be seen, or how to look around.
-fn field_hint(look: Look<'_>) -> &'static str {
+fn field_hint(look: LimbLook<'_>) -> &'static str {
     match look.view.field {
         Field::Strain | Field::Displacement if look.session.caches.touching.result().is_none() => {
             "Click on the limb to press it and see this field"

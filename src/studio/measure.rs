@@ -3,11 +3,11 @@
 use egui::{Align2, Color32, Painter, Stroke};
 use glam::DVec3;
 
-use super::paint::{Look, label};
+use super::paint::{LimbLook, label};
 use super::view::{Pane, Tool};
 
 /// Both points, and what lies between them.
-pub fn paint_measure(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_measure(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     if look.view.tool != Tool::Measure {
         return;
     }

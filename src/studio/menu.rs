@@ -5,7 +5,7 @@ use egui::Ui;
 use super::ask::Ask;
 use super::commands::UiCommand;
 use super::recent::Recent;
-use super::view::{Tool, Way};
+use super::view::{ScreenWay, Tool};
 use crate::document::Layer;
 use crate::io::examples::Example;
 use crate::render::camera::Preset;
@@ -45,7 +45,7 @@ fn gauges_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
         ask.button(ui, command);
     }
     ui.separator();
-    for way in Way::ALL {
+    for way in ScreenWay::ALL {
         ask.button(ui, UiCommand::Nudge(way));
     }
 }

@@ -2,12 +2,17 @@
 
 use glam::DVec3;
 
-use super::view::{View, Way};
+use super::view::{ScreenWay, ViewState};
 use crate::project::ChosenSite;
 use crate::session::Session;
 
 /// Where a gauge goes one step that way on the screen: to the next free site.
-pub fn next_site(session: &Session, view: &View, way: Way, number: usize) -> Option<ChosenSite> {
+pub fn next_site(
+    session: &Session,
+    view: &ViewState,
+    way: ScreenWay,
+    number: usize,
+) -> Option<ChosenSite> {
     let (lower, upper) = session.document.part.bounds();
     let spacing_mm = session.document.state.project.sites.spacing_mm;
     let reach = 4e-3 * spacing_mm.min((upper - lower).length() * 1000.0);

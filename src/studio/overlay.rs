@@ -5,13 +5,13 @@ use std::sync::Arc;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, vec2};
 use glam::{DVec3, Mat4};
 
-use super::paint::{Look, label};
+use super::paint::{LimbLook, label};
 use super::view::{Field, Gesture, Pane, Tool};
 use super::{labels, theme};
 use crate::colormap::ColorMap;
 use crate::mesh::stretch::KEPT;
 use crate::project::ChosenSite;
-use crate::render::gpu::{Frame3d, Slot, Uniforms};
+use crate::render::gpu::{Frame3d, PictureSlot, Uniforms};
 use eframe::egui_wgpu;
 
 /// How much a wall covers what is behind it when it can be seen through.
@@ -20,7 +20,7 @@ const GHOST: f32 = 0.22;
 const MARK: f32 = 9.0;
 
 /// The limb itself, as the adapter draws it.
-pub fn paint_limb(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
+pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, transparent: bool) {
     let Some(built) = &look.scene.built else {
         return;
     };
@@ -47,7 +47,7 @@ pub fn paint_limb(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
         theme::backdrop(ui.ctx().theme())
     };
     let frame = Frame3d {
-        slot: Slot::Limb,
+        slot: PictureSlot::Limb,
         solid: Arc::clone(&look.scene.solid),
         shown: Arc::clone(&built.shown),
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
@@ -60,7 +60,7 @@ pub fn paint_limb(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
 }
 
 /// Exaggeration, and whether a field or the regions colour the limb.
-fn deform_flags(look: Look<'_>, exaggeration: f32) -> [f32; 4] {
+fn deform_flags(look: LimbLook<'_>, exaggeration: f32) -> [f32; 4] {
     let flag = |on: bool| f32::from(u8::from(on));
     let field = look
         .scene
@@ -72,13 +72,13 @@ fn deform_flags(look: Look<'_>, exaggeration: f32) -> [f32; 4] {
 }
 
 /// How much walls cover what is behind them, and whether blind places are marked.
-fn cover(look: Look<'_>, share: f32) -> [f32; 4] {
+fn cover(look: LimbLook<'_>, share: f32) -> [f32; 4] {
     let marked = look.view.field == Field::Expected && look.scene.shows_field();
     [share, f32::from(u8::from(marked)), 0.0, 0.0]
 }
 
 /// The same laid flat.
-pub fn paint_unrolled(look: Look<'_>, ui: &Ui, rect: Rect) {
+pub fn paint_unrolled(look: LimbLook<'_>, ui: &Ui, rect: Rect) {
     let Some((built, flat)) =
         (look.scene.built.as_ref()).and_then(|built| Some((built, built.flat.as_ref()?)))
     else {
@@ -107,7 +107,7 @@ pub fn paint_unrolled(look: Look<'_>, ui: &Ui, rect: Rect) {
     };
     let back = theme::backdrop(ui.ctx().theme());
     let frame = Frame3d {
-        slot: Slot::Unrolled,
+        slot: PictureSlot::Unrolled,
         solid: Arc::clone(&look.scene.unrolled.solid),
         shown: Arc::clone(&flat.shown),
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
@@ -120,7 +120,7 @@ pub fn paint_unrolled(look: Look<'_>, ui: &Ui, rect: Rect) {
 }
 
 /// The touch, as an arrow.
-pub fn paint_touch(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_touch(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     let shown = look.view.tool == Tool::Touch;
     let Some(touched) = look.session.caches.touching.result().filter(|_| shown) else {
         return;
@@ -142,7 +142,7 @@ pub fn paint_touch(look: Look<'_>, painter: &Painter, pane: Pane) {
 }
 
 /// How far a point of the limb is drawn from where it is at rest.
-fn shift_at(look: Look<'_>, position: DVec3) -> DVec3 {
+fn shift_at(look: LimbLook<'_>, position: DVec3) -> DVec3 {
     let deformation = look.exaggeration().unwrap_or(0.0);
     let Some(touched) = look
         .session
@@ -161,7 +161,7 @@ fn shift_at(look: Look<'_>, position: DVec3) -> DVec3 {
 }
 
 /// The gauges with their numbers.
-pub fn paint_gauges(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_gauges(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     let sites = look.session.gauges();
     let rect = look.view.rect_of(pane);
     let marks: Vec<Mark> = (0..)
@@ -176,7 +176,7 @@ pub fn paint_gauges(look: Look<'_>, painter: &Painter, pane: Pane) {
 }
 
 /// How a gauge is drawn in a view.
-fn mark(look: Look<'_>, pane: Pane, number: usize, site: &ChosenSite) -> Option<Mark> {
+fn mark(look: LimbLook<'_>, pane: Pane, number: usize, site: &ChosenSite) -> Option<Mark> {
     let position = DVec3::from_array(site.position_mm) / 1000.0;
     let direction = DVec3::from_array(site.direction);
     let half = look.project().gauge.grid_length_mm * 0.5e-3;
@@ -214,7 +214,7 @@ fn mark(look: Look<'_>, pane: Pane, number: usize, site: &ChosenSite) -> Option<
 }
 
 /// What the brush would reach.
-pub fn paint_brush(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_brush(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     let Some(at) = look.view.hover else {
         return;
     };
@@ -248,7 +248,7 @@ pub fn paint_brush(look: Look<'_>, painter: &Painter, pane: Pane) {
 }
 
 /// The brush around a point of the part, as a line in a view.
-fn ring(look: Look<'_>, pane: Pane, centre: DVec3) -> Vec<Pos2> {
+fn ring(look: LimbLook<'_>, pane: Pane, centre: DVec3) -> Vec<Pos2> {
     let (at, _) = look.scene.index.nearest(centre);
     let normal = look.session.document.part.normal(at);
     let frame = crate::elasticity::observe::tangent_frame(normal);
@@ -275,7 +275,7 @@ fn ring(look: Look<'_>, pane: Pane, centre: DVec3) -> Vec<Pos2> {
 }
 
 /// What a box or lasso has gone around so far.
-pub fn paint_outline(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_outline(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     let Gesture::Outline(own, outline) = &look.view.gesture else {
         return;
     };

@@ -5,20 +5,20 @@ use std::sync::Arc;
 use egui::{Align2, Color32, FontId, Galley, Painter, Pos2, Rect, Ui, vec2};
 use glam::DVec3;
 
-use super::scene::Scene;
-use super::view::{Pane, Tool, View};
+use super::scene::PartScene;
+use super::view::{Pane, Tool, ViewState};
 use crate::project::Project;
 use crate::session::{ExpectedOf, Session};
 
 /// All that a picture of the limb is made of.
 #[derive(Clone, Copy)]
-pub struct Look<'a> {
+pub struct LimbLook<'a> {
     pub session: &'a Session,
-    pub view: &'a View,
-    pub scene: &'a Scene,
+    pub view: &'a ViewState,
+    pub scene: &'a PartScene,
 }
 
-impl<'a> Look<'a> {
+impl<'a> LimbLook<'a> {
     #[must_use]
     pub fn project(&self) -> &'a Project {
         &self.session.document.state.project
@@ -44,9 +44,9 @@ impl<'a> Look<'a> {
     }
 }
 
-/// As [`Look::exaggeration`].
+/// As [`LimbLook::exaggeration`].
 #[must_use]
-pub fn exaggeration(session: &Session, view: &View) -> Option<f64> {
+pub fn exaggeration(session: &Session, view: &ViewState) -> Option<f64> {
     let touched = session.caches.touching.result()?;
     touched.exaggeration.filter(|_| view.tool == Tool::Touch)
 }

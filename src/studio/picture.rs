@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use eframe::egui_wgpu::RenderState;
 use egui::{Context, FullOutput, Pos2, RawInput, Rect, vec2};
 
-use super::paint::Look;
-use super::scene::Scene;
-use super::view::View;
+use super::paint::LimbLook;
+use super::scene::PartScene;
+use super::view::ViewState;
 use super::{layout, theme};
 use crate::document::Document;
 use crate::io::atomic;
@@ -70,8 +70,8 @@ struct Easel {
     state: RenderState,
     ctx: Context,
     session: Session,
-    view: View,
-    scene: Scene,
+    view: ViewState,
+    scene: PartScene,
 }
 
 impl Easel {
@@ -81,8 +81,8 @@ impl Easel {
         let ctx = Context::default();
         theme::apply(&ctx);
         let session = Session::new(Document::new(loaded, None), Wake::default());
-        let mut view = View::of(&session.document);
-        let scene = Scene::of(&session.document, &session.shape);
+        let mut view = ViewState::of(&session.document);
+        let scene = PartScene::of(&session.document, &session.shape);
         if let Some(preset) = picture.view {
             view.camera.look_from(preset);
         }
@@ -131,8 +131,8 @@ fn pixels(
 /// The 3D view as it would be in a window of a picture's size, on a context of its own.
 fn drawn(
     session: &Session,
-    view: &View,
-    scene: &mut Scene,
+    view: &ViewState,
+    scene: &mut PartScene,
     ctx: &Context,
     picture: &Picture,
 ) -> FullOutput {
@@ -150,7 +150,7 @@ fn drawn(
         let rect = ui.ctx().content_rect();
         view.rect = rect;
         scene.build(session, &view);
-        let look = Look {
+        let look = LimbLook {
             session,
             view: &view,
             scene,
@@ -162,8 +162,8 @@ fn drawn(
 /// Writes what the 3D view shows into a PNG file, in the background.
 pub(super) fn save(
     session: &mut Session,
-    view: &View,
-    scene: &mut Scene,
+    view: &ViewState,
+    scene: &mut PartScene,
     ctx: &Context,
     path: PathBuf,
     picture: &Picture,

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::action::WindowAction;
 use super::ask::Ask;
-use crate::document::{Document, State};
+use crate::document::{Document, DocumentState};
 use crate::io::examples::write_bundled_mesh;
 use crate::io::{atomic, project_file};
 
@@ -26,7 +26,7 @@ const LOCK: &str = "lock";
 
 /// Where a project that was kept aside came from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Origin {
+struct RecoveredFrom {
     name: String,
     /// The file it was opened from, if there was one.
     path: Option<PathBuf>,
@@ -35,7 +35,7 @@ struct Origin {
 /// What was left behind by a program that ended.
 struct Left {
     folder: PathBuf,
-    origin: Origin,
+    origin: RecoveredFrom,
     /// Ours as long as the offer stands.
     _lock: File,
 }
@@ -44,7 +44,7 @@ struct Left {
 pub struct Recovery {
     folder: PathBuf,
     _lock: Option<File>,
-    kept: Option<State>,
+    kept: Option<DocumentState>,
     written: Instant,
     writing: Option<Receiver<Result<(), String>>>,
     left: Vec<Left>,
@@ -96,7 +96,7 @@ impl Recovery {
     fn write(&mut self, document: &Document) {
         let folder = self.folder.clone();
         let state = document.state.clone();
-        let origin = Origin {
+        let origin = RecoveredFrom {
             name: document.name(),
             path: document.path.as_deref().map(absolute),
         };
@@ -200,8 +200,8 @@ fn absolute(path: &Path) -> PathBuf {
 
 fn keep(
     folder: &Path,
-    mut state: State,
-    origin: &Origin,
+    mut state: DocumentState,
+    origin: &RecoveredFrom,
     mut mesh: PathBuf,
     bundled: bool,
 ) -> Result<(), String> {

@@ -3,7 +3,7 @@
 use egui::{Color32, Response, RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
 
-use super::action::Change;
+use super::action::ProjectChange;
 use super::ask::Ask;
 use super::by_force::{force_table, has_forces};
 use super::commands::UiCommand;
@@ -407,18 +407,18 @@ pub fn gauge_table(ask: &mut Ask<'_>, ui: &mut Ui) {
     });
     match asked {
         None => {}
-        Some((k, Row::Pick)) => {
+        Some((k, RowPressed::Pick)) => {
             ask.view.picked = vec![k];
             ask.view.take(Tool::Gauges);
         }
-        Some((k, Row::Add)) => ask.view.picked.push(k),
-        Some((k, Row::Frame)) => {
+        Some((k, RowPressed::Add)) => ask.view.picked.push(k),
+        Some((k, RowPressed::Frame)) => {
             ask.view.picked = vec![k];
             ask.command(UiCommand::FramePicked);
         }
-        Some((k, Row::Pin)) => {
+        Some((k, RowPressed::Pin)) => {
             ask.view.picked = vec![k];
-            ask.act(Change::PinGauges(vec![k]));
+            ask.act(ProjectChange::PinGauges(vec![k]));
         }
     }
 }
@@ -429,7 +429,7 @@ fn gauge_row(
     ui: &mut Ui,
     k: usize,
     site: &crate::project::ChosenSite,
-) -> Option<Row> {
+) -> Option<RowPressed> {
     let picked = ask.view.picked.contains(&k);
     let number = RichText::new(format!("{:>3}", k + 1)).monospace();
     let button = ui
@@ -438,9 +438,9 @@ fn gauge_row(
         .accessible_name(format!("Gauge {}", k + 1));
     let shift = ui.input(|i| i.modifiers.shift);
     let mut asked = match (button.double_clicked(), button.clicked()) {
-        (true, _) => Some(Row::Frame),
-        (_, true) if shift && !picked => Some(Row::Add),
-        (_, true) => Some(Row::Pick),
+        (true, _) => Some(RowPressed::Frame),
+        (_, true) if shift && !picked => Some(RowPressed::Add),
+        (_, true) => Some(RowPressed::Pick),
         _ => None,
     };
     let mut pinned = ask.session.pin_of(k).is_some();
@@ -451,7 +451,7 @@ fn gauge_row(
         .accessible_name(format!("Pin gauge {}", k + 1))
         .changed()
     {
-        asked = Some(Row::Pin);
+        asked = Some(RowPressed::Pin);
     }
     for x in site.position_mm {
         ui.monospace(format!("{x:8.2}"));
@@ -483,7 +483,7 @@ fn report_cells(ask: &Ask<'_>, ui: &mut Ui, k: usize) {
 }
 
 /// What was pressed in a row of the table.
-enum Row {
+enum RowPressed {
     Pick,
     Add,
     Frame,

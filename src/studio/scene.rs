@@ -5,8 +5,8 @@ use std::sync::Arc;
 use egui::{Pos2, Vec2, vec2};
 use glam::{DVec2, DVec3};
 
-use super::fields::Built;
-use super::view::{Pane, Section, View};
+use super::fields::BuiltField;
+use super::view::{Pane, SectionPlane, ViewState};
 use crate::document::Document;
 use crate::mesh::SurfacePoint;
 use crate::mesh::flatten::Flat;
@@ -15,7 +15,7 @@ use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::stance::{Direction, Stance};
 use crate::project::PartAxis;
 use crate::render::camera::Camera;
-use crate::render::gpu::{Solid, Vertex};
+use crate::render::gpu::{GpuVertex, Solid};
 use crate::session::{PartShape, Session};
 
 /// The part laid flat, as it is drawn and picked.
@@ -29,11 +29,15 @@ impl Unrolled {
     fn of(flat: Arc<Flat>, stance: Stance) -> Self {
         let up = [0.0, 0.0, 1.0];
         let stretch = flat.stretch_at_vertices();
-        let vertices = flat.positions.iter().zip(stretch).map(|(p, off)| Vertex {
-            position: p.as_vec3().to_array(),
-            normal: up,
-            stretch: off as f32,
-        });
+        let vertices = flat
+            .positions
+            .iter()
+            .zip(stretch)
+            .map(|(p, off)| GpuVertex {
+                position: p.as_vec3().to_array(),
+                normal: up,
+                stretch: off as f32,
+            });
         let solid = Solid {
             vertices: vertices.collect(),
             triangles: flat.triangles.clone(),
@@ -51,17 +55,17 @@ impl Unrolled {
 }
 
 /// The part and what colours it.
-pub struct Scene {
+pub struct PartScene {
     /// The key that the part stands by, and the box around it as it stands so.
     axis: PartAxis,
     pub around: OrientedBox,
     pub index: Arc<SurfaceIndex>,
     pub solid: Arc<Solid>,
     pub unrolled: Unrolled,
-    pub built: Option<Built>,
+    pub built: Option<BuiltField>,
 }
 
-impl Scene {
+impl PartScene {
     #[must_use]
     pub fn of(document: &Document, shape: &PartShape) -> Self {
         let axis = document.state.project.part.axis;
@@ -77,7 +81,7 @@ impl Scene {
     }
 
     /// Has part and views follow the part's axis where that has changed.
-    pub fn stand_upright(&mut self, session: &Session, view: &mut View) {
+    pub fn stand_upright(&mut self, session: &Session, view: &mut ViewState) {
         let document = &session.document;
         let axis = document.state.project.part.axis;
         if self.axis != axis {
@@ -86,7 +90,8 @@ impl Scene {
             self.around = OrientedBox::around(&document.part, stance);
             view.camera.stance = stance;
             let around = &self.around;
-            view.section = (view.section).map(|cut| Section::halving(around, cut.side, cut.flip));
+            view.section =
+                (view.section).map(|cut| SectionPlane::halving(around, cut.side, cut.flip));
         }
         let stance = view.camera.stance;
         if view.unrolled_shown && self.unrolled.stance != stance {
@@ -99,20 +104,20 @@ impl Scene {
 
     /// Where a stroke at a point of the part (m) is repeated.
     #[must_use]
-    pub fn image(&self, view: &View, p: DVec3) -> Option<DVec3> {
+    pub fn image(&self, view: &ViewState, p: DVec3) -> Option<DVec3> {
         Some(self.around.mirrored(p, view.mirror?))
     }
 
     /// Cuts one side of the part away, or nothing any more.
-    pub fn toggle_section(&self, view: &mut View) {
+    pub fn toggle_section(&self, view: &mut ViewState) {
         view.section = match view.section {
             Some(_) => None,
-            None => Some(Section::halving(&self.around, Direction::Front, false)),
+            None => Some(SectionPlane::halving(&self.around, Direction::Front, false)),
         };
     }
 
     /// Comes near to some points (m).
-    pub fn frame_points(&self, view: &mut View, points: &[DVec3], document: &Document) {
+    pub fn frame_points(&self, view: &mut ViewState, points: &[DVec3], document: &Document) {
         let Some(&first) = points.first() else {
             return;
         };
@@ -130,7 +135,7 @@ impl Scene {
 
     /// Where a point of the limb appears in the unrolled view, in points.
     #[must_use]
-    pub fn flat_place(&self, view: &View, p: DVec3) -> Option<Pos2> {
+    pub fn flat_place(&self, view: &ViewState, p: DVec3) -> Option<Pos2> {
         let (middle, per_point) = view.flat;
         if per_point == 0.0 {
             return None;
@@ -141,7 +146,7 @@ impl Scene {
 
     /// Where a point of the limb appears in a view, in points.
     #[must_use]
-    pub fn place_in(&self, view: &View, pane: Pane, p: DVec3) -> Option<Pos2> {
+    pub fn place_in(&self, view: &ViewState, pane: Pane, p: DVec3) -> Option<Pos2> {
         match pane {
             Pane::Limb => view.place(p).filter(|_| !view.is_cut(p)),
             Pane::Unrolled => self.flat_place(view, p),
@@ -151,7 +156,7 @@ impl Scene {
     /// As [`Self::place_in`], for many points.
     pub fn placing<'s>(
         &'s self,
-        view: &'s View,
+        view: &'s ViewState,
         pane: Pane,
     ) -> impl Fn(DVec3) -> Option<Pos2> + 's {
         let projection = view.camera.projection(view.rect.aspect_ratio());
@@ -166,7 +171,7 @@ impl Scene {
 
     /// The point of the limb under a place of the window.
     #[must_use]
-    pub fn pick(&self, view: &View, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
+    pub fn pick(&self, view: &ViewState, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
         match pane {
             Pane::Limb => pick_on(view, &self.index, at),
             Pane::Unrolled => {
@@ -178,7 +183,7 @@ impl Scene {
     }
 
     /// Shows all of the unrolled part.
-    pub fn show_all_flat(&self, view: &mut View) {
+    pub fn show_all_flat(&self, view: &mut ViewState) {
         let size = self.unrolled.flat.upper - self.unrolled.flat.lower;
         let room = view.flat_rect.size().max(Vec2::splat(1.0));
         let fit = (size.x / f64::from(room.x)).max(size.y / f64::from(room.y));
@@ -186,8 +191,8 @@ impl Scene {
     }
 
     /// Colours the part anew where what is shown has changed.
-    pub fn build(&mut self, session: &Session, view: &View) {
-        let built = Built::of(self.built.take(), &self.unrolled.flat, session, view);
+    pub fn build(&mut self, session: &Session, view: &ViewState) {
+        let built = BuiltField::of(self.built.take(), &self.unrolled.flat, session, view);
         self.built = Some(built);
     }
 
@@ -200,7 +205,7 @@ impl Scene {
 
 /// The point of a surface under a place of the window.
 #[must_use]
-pub fn pick_on(view: &View, index: &SurfaceIndex, at: Pos2) -> Option<SurfacePoint> {
+pub fn pick_on(view: &ViewState, index: &SurfaceIndex, at: Pos2) -> Option<SurfacePoint> {
     let u = (at - view.rect.min) / view.rect.size();
     let place = DVec2::new(f64::from(u.x), f64::from(u.y));
     let (origin, direction) = view.camera.ray(place, view.rect.aspect_ratio());

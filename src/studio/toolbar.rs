@@ -6,8 +6,8 @@ use egui::{DragValue, Ui};
 
 use super::ask::Ask;
 use super::commands::UiCommand;
-use super::scene::Scene;
-use super::view::{Field, Section, Tool};
+use super::scene::PartScene;
+use super::view::{Field, SectionPlane, Tool};
 use crate::document::Layer;
 use crate::mesh::stance::Direction;
 use crate::render::camera::Preset;
@@ -33,7 +33,7 @@ fn mirror_name(across: Option<Direction>) -> &'static str {
 }
 
 /// Two rows that stay as high as they are, whatever is chosen in them.
-pub fn toolbar(ask: &mut Ask<'_>, scene: &Scene, ui: &mut Ui) {
+pub fn toolbar(ask: &mut Ask<'_>, scene: &PartScene, ui: &mut Ui) {
     egui::Frame::new()
         .fill(ui.visuals().panel_fill)
         .inner_margin(egui::Margin::symmetric(8, 5))
@@ -66,7 +66,7 @@ pub fn toolbar(ask: &mut Ask<'_>, scene: &Scene, ui: &mut Ui) {
 }
 
 /// What the chosen tool and the section need, over the view: nothing moves when it comes and goes.
-pub fn options(ask: &mut Ask<'_>, scene: &Scene, ui: &Ui, view: egui::Rect) {
+pub fn options(ask: &mut Ask<'_>, scene: &PartScene, ui: &Ui, view: egui::Rect) {
     let has = ask.view.section.is_some()
         || ask.view.tool.paints()
         || ask.view.ranges.of(ask.view.field).is_some()
@@ -181,7 +181,7 @@ fn mirror_control(ask: &mut Ask<'_>, ui: &mut Ui) {
         .accessible_name("Mirror");
 }
 
-fn field_controls(ask: &mut Ask<'_>, scene: &Scene, ui: &mut Ui) {
+fn field_controls(ask: &mut Ask<'_>, scene: &PartScene, ui: &mut Ui) {
     egui::ComboBox::new("field", "")
         .selected_text(ask.view.field.name())
         .width(128.0)
@@ -227,7 +227,7 @@ fn range_controls(ask: &mut Ask<'_>, ui: &mut Ui) {
     ask.view.ranges.set(field, Some((low, high)));
 }
 
-fn section_controls(ask: &mut Ask<'_>, scene: &Scene, ui: &mut Ui) {
+fn section_controls(ask: &mut Ask<'_>, scene: &PartScene, ui: &mut Ui) {
     let around = scene.around;
     let Some(section) = &mut ask.view.section else {
         return;
@@ -240,7 +240,7 @@ fn section_controls(ask: &mut Ask<'_>, scene: &Scene, ui: &mut Ui) {
                 .add(egui::Button::selectable(section.side == side, name))
                 .accessible_name(format!("Cut away: {}", name.to_lowercase()));
             if button.clicked() {
-                *section = Section::halving(&around, side, section.flip);
+                *section = SectionPlane::halving(&around, side, section.flip);
             }
         }
         let flip = ui

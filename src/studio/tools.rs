@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::action::{BoardAction, Compute, HandAction, History};
 use super::ask::Ask;
 use super::paint::exaggeration;
-use super::scene::{Scene, pick_on};
-use super::view::{Field, Gesture, Pane, Stage, Tool, View};
+use super::scene::{PartScene, pick_on};
+use super::view::{Field, Gesture, Pane, Stage, Tool, ViewState};
 use crate::document::Brush;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::ChosenSite;
@@ -20,7 +20,7 @@ const REACH: f32 = 14.0;
 
 /// Orbit with the right button (or the left one where the tool has no use for it), pan with the middle one or with Shift,
 /// zoom with the wheel; with Shift the wheel sets the brush.
-pub fn navigate(view: &mut View, ui: &Ui, response: &Response, pane: Pane) {
+pub fn navigate(view: &mut ViewState, ui: &Ui, response: &Response, pane: Pane) {
     let drag = response.drag_delta();
     let shift = ui.input(|i| i.modifiers.shift);
     let left = response.dragged_by(PointerButton::Primary);
@@ -58,7 +58,7 @@ pub fn navigate(view: &mut View, ui: &Ui, response: &Response, pane: Pane) {
 }
 
 /// What the tool in hand does where the pointer is.
-pub fn use_tool(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, response: &Response, pane: Pane) {
+pub fn use_tool(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, response: &Response, pane: Pane) {
     let covered = ask.view.covered;
     let free = |at: &Pos2| !covered.contains(*at);
     if let Some(at) = response.hover_pos().filter(free) {
@@ -81,7 +81,7 @@ pub fn use_tool(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, response: &Response, 
     }
 }
 
-fn click(scene: &Scene, ask: &mut Ask<'_>, response: &Response, pane: Pane) {
+fn click(scene: &PartScene, ask: &mut Ask<'_>, response: &Response, pane: Pane) {
     match ask.view.tool {
         Tool::Touch => press(scene, ask, pane, response.interact_pointer_pos()),
         Tool::Measure => {
@@ -97,7 +97,7 @@ fn click(scene: &Scene, ask: &mut Ask<'_>, response: &Response, pane: Pane) {
 }
 
 /// The left button goes down.
-fn begin(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, from: Pos2) {
+fn begin(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, from: Pos2) {
     match ask.view.tool {
         Tool::Gauges => grab(scene, ask, ui, pane, from),
         Tool::Paint | Tool::Erase if scene.pick(ask.view, pane, from).is_some() => {
@@ -112,7 +112,7 @@ fn begin(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, from: Pos2) {
 }
 
 /// The pointer moves while something is under way in this view.
-fn go_on(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
+fn go_on(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
     let tool = ask.view.tool;
     match &mut ask.view.gesture {
         Gesture::Stroke(own, _) if *own == pane => stroke(scene, ask, ui, pane, at),
@@ -134,7 +134,7 @@ fn go_on(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
     }
 }
 
-fn let_go(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane) {
+fn let_go(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane) {
     let own = match &ask.view.gesture {
         Gesture::None => return,
         Gesture::Stroke(own, _) | Gesture::Outline(own, _) | Gesture::Gauge(own, ..) => *own,
@@ -151,7 +151,7 @@ fn let_go(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane) {
     ask.act(History::Settle);
 }
 
-fn press(scene: &Scene, ask: &mut Ask<'_>, pane: Pane, at: Option<Pos2>) {
+fn press(scene: &PartScene, ask: &mut Ask<'_>, pane: Pane, at: Option<Pos2>) {
     let Some(place) = at.and_then(|at| pick_shown(scene, ask, pane, at)) else {
         return ask.act(Compute::LetGo);
     };
@@ -172,7 +172,7 @@ fn clicks_known_touches(ask: &Ask<'_>) -> bool {
 }
 
 /// The point of the limb under a place of the window, on the shape that is shown there.
-fn pick_shown(scene: &Scene, ask: &Ask<'_>, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
+fn pick_shown(scene: &PartScene, ask: &Ask<'_>, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
     match ask.session.caches.touching.result() {
         Some(touched) if pane == Pane::Limb && exaggeration(ask.session, ask.view).is_some() => {
             pick_on(ask.view, &touched.index, at)
@@ -183,7 +183,7 @@ fn pick_shown(scene: &Scene, ask: &Ask<'_>, pane: Pane, at: Pos2) -> Option<Surf
 
 /// The pointer goes down with the gauges in hand: on one it is picked and may be moved, beside them none is. Shift picks
 /// several, Control puts a new one there.
-fn grab(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
+fn grab(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
     let modifiers = ui.input(|i| i.modifiers);
     let away = |n: &usize| {
         let place = ask.session.gauge_place(*n);
@@ -217,7 +217,7 @@ fn grab(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
 
 /// The site for a gauge nearest to a place of a view.
 fn site_at(
-    scene: &Scene,
+    scene: &PartScene,
     ask: &Ask<'_>,
     pane: Pane,
     at: Pos2,
@@ -228,7 +228,7 @@ fn site_at(
 }
 
 /// What a brush or outline does now: Control turns it around, as elsewhere.
-fn brush(view: &View, ui: &Ui) -> Brush {
+fn brush(view: &ViewState, ui: &Ui) -> Brush {
     let erases = view.tool == Tool::Erase;
     if erases == ui.input(|i| i.modifiers.ctrl) {
         Brush::Paint
@@ -239,7 +239,7 @@ fn brush(view: &View, ui: &Ui) -> Brush {
 
 /// Dabs along the way from the last pointer sample, so that a fast stroke has no gaps: half a radius apart, nearer where
 /// that is less than a few points of the window.
-fn stroke(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, to: Pos2) {
+fn stroke(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, to: Pos2) {
     const MOST: f32 = 256.0;
     let Gesture::Stroke(_, from) = ask.view.gesture else {
         return;
@@ -269,7 +269,7 @@ fn stroke(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, to: Pos2) {
 }
 
 /// Half the brush's radius in points of the window.
-fn dab_step(scene: &Scene, view: &View, part: &TriMesh, pane: Pane, at: Pos2) -> f32 {
+fn dab_step(scene: &PartScene, view: &ViewState, part: &TriMesh, pane: Pane, at: Pos2) -> f32 {
     match pane {
         Pane::Unrolled => (0.5 * view.brush / view.flat.1) as f32,
         Pane::Limb => {
@@ -288,7 +288,7 @@ fn dab_step(scene: &Scene, view: &View, part: &TriMesh, pane: Pane, at: Pos2) ->
 }
 
 /// Marks the vertices inside an outline: those that can be seen, or all where walls are see-through.
-fn mark_inside(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, mut outline: Vec<Pos2>) {
+fn mark_inside(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, mut outline: Vec<Pos2>) {
     if let (Tool::Box, [a, b]) = (ask.view.tool, &outline[..]) {
         outline = vec![*a, Pos2::new(b.x, a.y), *b, Pos2::new(a.x, b.y)];
     }
@@ -315,7 +315,7 @@ fn mark_inside(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, mut outlin
 }
 
 /// Whether nothing of the part lies between the eye and one of its vertices.
-fn is_seen(scene: &Scene, view: &View, part: &TriMesh, vertex: u32) -> bool {
+fn is_seen(scene: &PartScene, view: &ViewState, part: &TriMesh, vertex: u32) -> bool {
     let p = part.positions()[vertex as usize];
     let Some(at) = view.place(p) else {
         return false;

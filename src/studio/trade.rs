@@ -3,13 +3,13 @@
 use egui::{Color32, DragValue, RichText, Role, Ui, WidgetInfo};
 use egui_plot::{GridMark, Line, Plot, PlotPoint, PlotPoints, PlotTransform, Points};
 
-use super::action::Change;
+use super::action::ProjectChange;
 use super::ask::Ask;
 use super::commands::UiCommand;
 use super::paint::empty;
 use super::theme;
 use crate::session::{Promise, Task};
-use crate::trade::{Setting, TradeConstraint, knobs};
+use crate::trade::{TradeConstraint, TradeSetting, knobs};
 
 const FRONT: Color32 = Color32::from_rgb(86, 180, 233);
 const OTHER: Color32 = Color32::from_rgb(125, 133, 143);
@@ -37,9 +37,9 @@ impl Default for Dial {
 }
 
 /// A measured point as it is drawn: seconds by the clock here, and mean error (mm).
-struct Drawn {
+struct DrawnPoint {
     at: [f64; 2],
-    setting: Setting,
+    setting: TradeSetting,
     on_front: bool,
     words: String,
 }
@@ -57,7 +57,7 @@ pub fn trade_tab(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui) {
                     "Nothing is measured of this project yet. “Measure the trade” runs it at many settings and judges each by one model finer than all of them",
                 );
             } else if let Some(setting) = trade_plot(ask, ui, &drawn) {
-                ask.act(Change::ApplySetting(Box::new(setting)));
+                ask.act(ProjectChange::ApplySetting(Box::new(setting)));
             }
         });
         ui.separator();
@@ -68,7 +68,7 @@ pub fn trade_tab(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui) {
     });
 }
 
-fn drawn_points(ask: &Ask<'_>) -> Vec<Drawn> {
+fn drawn_points(ask: &Ask<'_>) -> Vec<DrawnPoint> {
     let project = ask.project();
     let points = ask.session.measured_points();
     let best = crate::trade::front(project, &points);
@@ -78,7 +78,7 @@ fn drawn_points(ask: &Ask<'_>) -> Vec<Drawn> {
         .filter_map(|p| {
             let m = p.measured()?;
             let seconds = m.cpu_seconds * clock;
-            (seconds > 0.0 && m.error_mm > 0.0).then(|| Drawn {
+            (seconds > 0.0 && m.error_mm > 0.0).then(|| DrawnPoint {
                 at: [seconds, m.error_mm],
                 setting: p.setting,
                 on_front: best.iter().any(|b| std::ptr::eq(*b, p)),
@@ -94,7 +94,7 @@ fn drawn_points(ask: &Ask<'_>) -> Vec<Drawn> {
 }
 
 /// The plot; the setting that was clicked on.
-fn trade_plot(ask: &Ask<'_>, ui: &mut Ui, drawn: &[Drawn]) -> Option<Setting> {
+fn trade_plot(ask: &Ask<'_>, ui: &mut Ui, drawn: &[DrawnPoint]) -> Option<TradeSetting> {
     let project = ask.project();
     let marks = |on: bool| -> PlotPoints<'static> {
         let some = drawn.iter().filter(|d| d.on_front == on);
@@ -152,7 +152,7 @@ fn trade_plot(ask: &Ask<'_>, ui: &mut Ui, drawn: &[Drawn]) -> Option<Setting> {
     clicked.then_some(near.setting)
 }
 
-fn trade_side(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui, drawn: &[Drawn]) {
+fn trade_side(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui, drawn: &[DrawnPoint]) {
     let running = ask.session.jobs.runs(Task::Trade);
     ui.horizontal(|ui| {
         let button = ui.add_enabled(!running, egui::Button::new("Measure the trade"));
@@ -218,13 +218,13 @@ fn dial_rows(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui) {
         ui.end_row();
     });
     if let Some(asked) = asked {
-        ask.act(Change::AskFor(asked));
+        ask.act(ProjectChange::AskFor(asked));
     }
 }
 
 /// The front as rows, for those who do not point.
-fn front_table(ask: &mut Ask<'_>, ui: &mut Ui, drawn: &[Drawn]) {
-    let mut rows: Vec<&Drawn> = drawn.iter().filter(|d| d.on_front).collect();
+fn front_table(ask: &mut Ask<'_>, ui: &mut Ui, drawn: &[DrawnPoint]) {
+    let mut rows: Vec<&DrawnPoint> = drawn.iter().filter(|d| d.on_front).collect();
     rows.sort_by(|a, b| a.at[0].total_cmp(&b.at[0]));
     let mut chosen = None;
     egui::Grid::new("front")
@@ -252,7 +252,7 @@ fn front_table(ask: &mut Ask<'_>, ui: &mut Ui, drawn: &[Drawn]) {
             }
         });
     if let Some(setting) = chosen {
-        ask.act(Change::ApplySetting(Box::new(setting)));
+        ask.act(ProjectChange::ApplySetting(Box::new(setting)));
     }
 }
 
@@ -279,11 +279,11 @@ fn knob_table(ask: &Ask<'_>, ui: &mut Ui) {
 
 /// What is nearest to the pointer, where it is near.
 fn nearest<'a>(
-    drawn: &'a [Drawn],
+    drawn: &'a [DrawnPoint],
     transform: &PlotTransform,
     pointer: egui::Pos2,
-) -> Option<&'a Drawn> {
-    let away = |d: &Drawn| {
+) -> Option<&'a DrawnPoint> {
+    let away = |d: &DrawnPoint| {
         let [x, y] = d.at.map(f64::log10);
         transform
             .position_from_point(&PlotPoint::new(x, y))

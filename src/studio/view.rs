@@ -10,16 +10,18 @@ use glam::{DVec2, DVec3};
 use crate::document::{Document, Layer};
 use crate::mesh::SurfacePoint;
 use crate::mesh::stance::Direction;
-use crate::project::{Kept, PartAxis, Project};
+use crate::project::{KeptSelection, PartAxis, Project};
 use crate::render::camera::Camera;
 use crate::session::{ExpectedOf, Session};
 
 pub use crate::session::Stage;
-pub use choices::{Field, Gesture, Measure, Pane, Picture, Ranges, Section, Tab, Tool, Way};
+pub use choices::{
+    Field, Gesture, Measure, Pane, Picture, Ranges, ScreenWay, SectionPlane, Tab, Tool,
+};
 
 /// What is shown, picked and chosen.
 #[derive(Clone, Debug, PartialEq)]
-pub struct View {
+pub struct ViewState {
     /// The stage whose settings are shown.
     pub stage: Stage,
     /// What is shown below the views.
@@ -41,7 +43,7 @@ pub struct View {
     pub brush: f64,
     /// Strokes are repeated on the other side of the part's middle, across this direction.
     pub mirror: Option<Direction>,
-    pub section: Option<Section>,
+    pub section: Option<SectionPlane>,
     pub see_through: bool,
     pub unrolled_shown: bool,
     /// Whether the jig is drawn.
@@ -60,7 +62,7 @@ pub struct View {
     pub covered: Rect,
 }
 
-impl View {
+impl ViewState {
     /// The first look at a project.
     #[must_use]
     pub fn of(document: &Document) -> Self {
@@ -95,7 +97,10 @@ impl View {
     }
 
     /// Kept selections that are shown, with their numbers.
-    pub fn compared<'s>(&self, project: &'s Project) -> impl Iterator<Item = (usize, &'s Kept)> {
+    pub fn compared<'s>(
+        &self,
+        project: &'s Project,
+    ) -> impl Iterator<Item = (usize, &'s KeptSelection)> {
         let kept = project.kept.iter().enumerate();
         kept.filter(|(_, kept)| self.shown_kept.contains(&kept.name))
     }

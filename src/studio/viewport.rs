@@ -3,7 +3,7 @@
 use egui::{Pos2, Rect, Role, Sense, Ui, WidgetInfo};
 
 use super::ask::Ask;
-use super::scene::Scene;
+use super::scene::PartScene;
 use super::tools;
 use super::view::Pane;
 
@@ -11,7 +11,7 @@ use super::view::Pane;
 const BESIDE: f32 = 0.42;
 
 /// The views, where they lie, once what the pointer does in them was taken in.
-pub fn show(scene: &mut Scene, ui: &mut Ui, ask: &mut Ask<'_>) -> Vec<(Pane, Rect)> {
+pub fn show(scene: &mut PartScene, ui: &mut Ui, ask: &mut Ask<'_>) -> Vec<(Pane, Rect)> {
     ask.view.hover = None;
     scene.stand_upright(ask.session, ask.view);
     let all = ui.available_rect_before_wrap();
@@ -30,7 +30,7 @@ pub fn show(scene: &mut Scene, ui: &mut Ui, ask: &mut Ask<'_>) -> Vec<(Pane, Rec
 }
 
 /// Takes in what the pointer does in a view.
-fn pane(scene: &Scene, ui: &mut Ui, ask: &mut Ask<'_>, pane: Pane, rect: Rect) {
+fn pane(scene: &PartScene, ui: &mut Ui, ask: &mut Ask<'_>, pane: Pane, rect: Rect) {
     let name = match pane {
         Pane::Limb => "3D view",
         Pane::Unrolled => "Unrolled view",

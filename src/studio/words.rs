@@ -1,7 +1,7 @@
 //! States in words, with the colour that they are said in where they are to be noticed.
 
 use super::theme;
-use crate::link::State;
+use crate::link::ConnectionState;
 use crate::session::Session;
 
 /// How the connection stands.
@@ -14,20 +14,27 @@ pub fn live_in_words(session: &Session) -> (String, Option<egui::Color32>) {
         .live
         .look(|f| (f.state.clone(), f.taring, f.tared, f.trouble.clone()))
         .unwrap_or_default();
-    if let Some(why) = trouble.filter(|_| matches!(state, Some(State::Waiting | State::Silent))) {
+    if let Some(why) = trouble.filter(|_| {
+        matches!(
+            state,
+            Some(ConnectionState::Waiting | ConnectionState::Silent)
+        )
+    }) {
         return (format!("Not understood: {why}"), Some(theme::ERROR));
     }
     match state {
         None => ("Not connected".into(), None),
-        Some(State::Waiting) => ("Waiting for the board".into(), None),
-        Some(State::Live) if taring => ("Taring: do not touch".into(), Some(theme::TOUCHED)),
-        Some(State::Live) if !tared => ("Live, not tared".into(), Some(theme::STALE)),
-        Some(State::Live) => ("Live".into(), None),
-        Some(State::Silent) => ("The board has fallen silent".into(), Some(theme::ERROR)),
-        Some(State::Gone) => (
+        Some(ConnectionState::Waiting) => ("Waiting for the board".into(), None),
+        Some(ConnectionState::Live) if taring => {
+            ("Taring: do not touch".into(), Some(theme::TOUCHED))
+        }
+        Some(ConnectionState::Live) if !tared => ("Live, not tared".into(), Some(theme::STALE)),
+        Some(ConnectionState::Live) => ("Live".into(), None),
+        Some(ConnectionState::Silent) => ("The board has fallen silent".into(), Some(theme::ERROR)),
+        Some(ConnectionState::Gone) => (
             "Unplugged: waiting for the board".into(),
             Some(theme::ERROR),
         ),
-        Some(State::Ended) => ("The recording is over".into(), None),
+        Some(ConnectionState::Ended) => ("The recording is over".into(), None),
     }
 }

@@ -11,13 +11,14 @@ use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
 use crate::gaussian_process::{self, Covariance, Distances};
 use crate::placement::entropy::Entropy;
-use crate::placement::expected_error::{ExpectedError, ROUNDS, Scatter};
+use crate::placement::expected_error::{ExpectedError, ROUNDS, ReadingScatter};
 use crate::placement::greedy_svr::{Audit, Comparison};
 use crate::placement::information::{Geometry, GeometrySummary};
 use crate::placement::mutual_information::MutualInformation;
 use crate::placement::pca_qr::PcaQr;
 use crate::placement::{
-    Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet,
+    Constraints, PlacementError, Pool, Selection, SelectionRequest, Selector, SelectorKind,
+    SensorSet,
 };
 
 /// A choice with what it was made from.
@@ -28,14 +29,14 @@ pub struct Choice {
     /// The Gaussian process, where one chose.
     pub geometry: Option<GeometrySummary>,
     /// What a choice by expected error weighed.
-    pub weighed: Option<Weighed>,
+    pub weighed: Option<WeighedErrors>,
     /// CPU time (s) of the distances, the search of the kernel, and the choice itself.
     pub seconds: ChoiceSeconds,
 }
 
 /// What a choice by expected error took to be off.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Weighed {
+pub struct WeighedErrors {
     /// Standard deviation of the noise of a reading, beside what the data scatter by; in the unit of the signals.
     pub noise: f64,
     /// The lightest and the hardest touch that come (N); absent where the data do not say how hard touches were.
@@ -74,14 +75,14 @@ pub fn select(
     found: &(dyn Fn(&SensorSet) + Sync),
 ) -> Result<Choice, PlacementError> {
     enough_touches(data, settings)?;
-    let offer = Offer::new(data, kept_out, constraints, settings)?;
+    let offer = AskedSites::new(data, kept_out, constraints, settings)?;
     let pool = Pool {
         x: &offer.x,
         targets: &data.targets,
         sites: &offer.open,
         positions: &offer.positions,
     };
-    let request = Request {
+    let request = SelectionRequest {
         constraints: &offer.constraints,
         watch,
         found,
@@ -124,7 +125,7 @@ fn enough_touches(data: &Data, settings: &ChoiceSettings) -> Result<(), Placemen
 }
 
 /// The sites that may be chosen, with what is asked of the choice among them.
-struct Offer<'a> {
+struct AskedSites<'a> {
     /// As numbered in the data.
     open: Vec<usize>,
     /// Their signals, as the selector is to see them.
@@ -135,7 +136,7 @@ struct Offer<'a> {
     constraints: Constraints,
 }
 
-impl<'a> Offer<'a> {
+impl<'a> AskedSites<'a> {
     fn new(
         data: &'a Data,
         kept_out: &[usize],
@@ -235,12 +236,12 @@ fn by_geometry(
 /// A choice by expected error: what readings are off by is what the data scatter by, beside the noise.
 fn by_expected_error(
     pool: &Pool,
-    request: &Request,
+    request: &SelectionRequest,
     data: &Data,
     settings: &ChoiceSettings,
-) -> Result<(Selection, Weighed), PlacementError> {
+) -> Result<(Selection, WeighedErrors), PlacementError> {
     let (noise, seed) = (settings.noise, settings.svr.seed);
-    let scatter = Scatter::of(pool.x, pool.targets, forces_of(data));
+    let scatter = ReadingScatter::of(pool.x, pool.targets, forces_of(data));
     let variance = |row: usize, touch: usize| scatter.variance(row, touch);
     let known = knowledge(&data.forces, settings.forces, noise, seed, &variance);
     let forces_n = known.forces.map(|f| f.coming);
@@ -263,7 +264,7 @@ fn by_expected_error(
     let rows = chosen
         .iter()
         .filter_map(|site| pool.sites.iter().position(|s| s == site));
-    let weighed = Weighed {
+    let weighed = WeighedErrors {
         noise,
         forces_n,
         seed,

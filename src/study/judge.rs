@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use super::question::{Estimator, HeldOut, Judged, MOST_PLACES, Parts, Question, Verdict};
+use super::question::{
+    Estimator, HeldOut, JudgedQuestion, MOST_PLACES, Parts, StudyQuestion, StudyVerdict,
+};
 use super::{Data, clump_note, constant_notes, repeat_note, templates};
 use crate::budget::{Watch, report};
 use crate::dataset::SignalMatrix;
@@ -12,14 +14,18 @@ use crate::pca::PcaError;
 use crate::placement::greedy_svr::GreedySvr;
 use crate::placement::{PlacementError, Pool};
 use crate::regression::folds::{Folds, evenly, hold_out, number_of};
-use crate::regression::tune::{self, CrossValidation, Grid, distances};
+use crate::regression::tune::{self, CrossValidation, TuningGrid, distances};
 use crate::regression::{Hyper, PositionModel, scale};
 
 /// Judges given sites.
 ///
 /// # Errors
 /// [`PlacementError`] for too few touches, for sites of which none changes from touch to touch, or when the watch asks for a stop.
-pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdict, PlacementError> {
+pub fn evaluate(
+    data: &Data,
+    question: &StudyQuestion,
+    watch: Watch,
+) -> Result<StudyVerdict, PlacementError> {
     let svr = question.svr;
     let groups = match question.groups {
         Some(groups) => Cow::Borrowed(groups),
@@ -59,7 +65,7 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
         notes.extend(clump_note(svr, &data.targets));
     }
     notes.extend(judged.unfinished_note());
-    Ok(Verdict {
+    Ok(StudyVerdict {
         criteria_mm: judged.criteria_mm,
         fold_of_touch: folds.of_touches(),
         errors: judged.errors,
@@ -74,10 +80,10 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
 /// Judges by a regression trained for each set.
 fn by_regression(
     data: &Data,
-    question: &Question,
+    question: &StudyQuestion,
     parts: &Parts,
     watch: Watch,
-) -> Result<Judged, PlacementError> {
+) -> Result<JudgedQuestion, PlacementError> {
     let svr = question.svr;
     let all: Vec<usize> = (0..parts.signals.rows()).collect();
     let prefixes: Vec<Vec<usize>> = (1..=question.sites.len())
@@ -119,7 +125,7 @@ fn by_regression(
     } else {
         cross_validated(data, question, parts, &prefixes, watch)?
     };
-    Ok(Judged {
+    Ok(JudgedQuestion {
         criteria_mm,
         errors,
         baseline,
@@ -130,7 +136,7 @@ fn by_regression(
 /// The criterion (mm) of some sets with the regression as given, for folds of groups that only the user knows.
 fn cross_validated(
     data: &Data,
-    question: &Question,
+    question: &StudyQuestion,
     parts: &Parts,
     sets: &[Vec<usize>],
     watch: Watch,
@@ -173,7 +179,7 @@ impl Split {
     fn judge(
         &self,
         rows: &[usize],
-        question: &Question,
+        question: &StudyQuestion,
         watch: Watch,
     ) -> Result<HeldOut, PlacementError> {
         /// Touches that settings are searched on.
@@ -190,7 +196,7 @@ impl Split {
                 effort: svr.effort,
             };
             let x = train.select_columns(&some);
-            let grid = Grid::default().scaled(scale::relative(&self.train_targets));
+            let grid = TuningGrid::default().scaled(scale::relative(&self.train_targets));
             tune::search(&x, &targets, &grid, &validation, watch)?
                 .0
                 .best()

@@ -23,7 +23,7 @@ pub enum Estimator {
 }
 
 /// What is asked about given sites.
-pub struct Question<'a> {
+pub struct StudyQuestion<'a> {
     /// Rows of the data, in the order of their importance.
     pub sites: &'a [usize],
     /// What turns readings into places.
@@ -89,7 +89,7 @@ impl HeldOut {
 
 /// The answers: for one gauge, two, … all of them in the order given.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
+pub struct StudyVerdict {
     /// Cross-validated over all touches.
     pub criteria_mm: Vec<f64>,
     /// The fold that each touch is tested in.
@@ -109,14 +109,14 @@ pub struct Verdict {
 }
 
 /// What an estimator makes of a question.
-pub(super) struct Judged {
+pub(super) struct JudgedQuestion {
     pub(super) criteria_mm: Vec<f64>,
     pub(super) errors: Vec<HeldOut>,
     pub(super) baseline: Option<HeldOut>,
     pub(super) failures: Vec<FailureRow>,
 }
 
-impl Judged {
+impl JudgedQuestion {
     /// That regressions ended before they were done.
     pub(super) fn unfinished_note(&self) -> Option<String> {
         let mut found = self.errors.iter().chain(&self.baseline);
@@ -139,7 +139,7 @@ pub(super) struct Parts<'a> {
 /// More places than any data have.
 pub(super) const MOST_PLACES: usize = 10_000_000;
 
-impl Question<'_> {
+impl StudyQuestion<'_> {
     /// How many of so many places are held out.
     pub(super) fn tests(&self, places: usize) -> usize {
         (self.held_out * places as f64).round() as usize

@@ -2,28 +2,28 @@
 
 use rayon::prelude::*;
 
-use super::question::{Estimator, HeldOut, Judged, Parts, Question};
+use super::question::{Estimator, HeldOut, JudgedQuestion, Parts, StudyQuestion};
 use super::{Data, knowledge};
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::evaluation::failures::{Draw, FailureRow};
 use crate::inference::MeasuredMatching;
-use crate::placement::expected_error::Scatter;
+use crate::placement::expected_error::ReadingScatter;
 use crate::regression::Standardizer;
 use crate::regression::folds::evenly;
 use crate::regression::tune::distances;
 
 /// An estimator that has seen its templates.
-enum Seen {
+enum SeenTemplates {
     Matching(MeasuredMatching),
     Nearest(Nearest),
 }
 
-impl Seen {
+impl SeenTemplates {
     /// From some sites under some touches of data.
     fn new(
         data: &Data,
-        question: &Question,
+        question: &StudyQuestion,
         groups: &[usize],
         rows: &[usize],
         touches: &[usize],
@@ -40,7 +40,7 @@ impl Seen {
             touches.iter().map(|&t| data.forces[t]).collect()
         };
         let known = (!forces.is_empty()).then_some(&forces[..]);
-        let scatter = Scatter::of(&x, &targets, known);
+        let scatter = ReadingScatter::of(&x, &targets, known);
         let variance = |site: usize, touch: usize| scatter.variance(site, touch);
         let known = knowledge(&forces, None, question.noise, question.svr.seed, &variance);
         Self::Matching(MeasuredMatching::new(&x, &targets, &known))
@@ -170,11 +170,11 @@ impl Nearest {
 /// the noise asked for.
 pub(super) fn judge(
     data: &Data,
-    question: &Question,
+    question: &StudyQuestion,
     parts: &Parts,
     watch: Watch,
-) -> Result<Judged, Cancelled> {
-    let judge = Judge {
+) -> Result<JudgedQuestion, Cancelled> {
+    let judge = TemplateJudge {
         data,
         question,
         parts,
@@ -185,7 +185,7 @@ pub(super) fn judge(
         .map(|count| judge.held_out(&question.sites[..count], count))
         .collect();
     let all: Vec<usize> = (0..data.x.rows()).collect();
-    Ok(Judged {
+    Ok(JudgedQuestion {
         criteria_mm: judge.criteria()?,
         errors: errors?,
         baseline: question
@@ -196,20 +196,26 @@ pub(super) fn judge(
     })
 }
 
-struct Judge<'a> {
+struct TemplateJudge<'a> {
     data: &'a Data,
-    question: &'a Question<'a>,
+    question: &'a StudyQuestion<'a>,
     parts: &'a Parts<'a>,
     watch: Watch<'a>,
 }
 
-impl Judge<'_> {
-    fn seen(&self, rows: &[usize], touches: &[usize]) -> Seen {
-        Seen::new(self.data, self.question, self.parts.groups, rows, touches)
+impl TemplateJudge<'_> {
+    fn seen(&self, rows: &[usize], touches: &[usize]) -> SeenTemplates {
+        SeenTemplates::new(self.data, self.question, self.parts.groups, rows, touches)
     }
 
     /// Errors (mm) at some touches, with some of the gauges.
-    fn errors(&self, seen: &Seen, rows: &[usize], touches: &[usize], used: &[bool]) -> Vec<f64> {
+    fn errors(
+        &self,
+        seen: &SeenTemplates,
+        rows: &[usize],
+        touches: &[usize],
+        used: &[bool],
+    ) -> Vec<f64> {
         let x = self.parts.signals.select_rows(rows).select_columns(touches);
         let targets: Vec<[f64; 3]> = touches.iter().map(|&t| self.data.targets[t]).collect();
         distances(&seen.find(&x, used), &targets)

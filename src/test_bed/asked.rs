@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::bench::Limits;
+use crate::bench::PressLimits;
 use crate::design::Workshop;
 
 /// Where, how deep and how hard is pressed, and by what.
@@ -30,7 +30,7 @@ pub struct BenchRequest {
 
 impl Default for BenchRequest {
     fn default() -> Self {
-        let limits = Limits::default();
+        let limits = PressLimits::default();
         Self {
             machine: None,
             places: 300,

@@ -6,7 +6,7 @@ use anyhow::{Context as _, ensure};
 
 use crate::dataset::SignalMatrix;
 use crate::inference::Chain;
-use crate::io::bench_folder::{self, About, Columns};
+use crate::io::bench_folder::{self, PressedPart, TouchColumns};
 use crate::io::machine_file;
 use crate::link::{BenchPress, bench_presses};
 use crate::plain;
@@ -32,24 +32,24 @@ impl Default for Wanted {
 }
 
 /// What stands in the folder of a run.
-pub struct Collected {
+pub struct CollectedRun {
     /// The limb and the machine.
-    pub about: About,
+    pub about: PressedPart,
     /// The board that read it, by its number; empty for one that has none.
     pub board: String,
     /// How many presses were finished.
     pub presses: usize,
     /// The readings.
-    pub columns: Columns,
+    pub columns: TouchColumns,
 }
 
-impl Collected {
+impl CollectedRun {
     /// Reads a folder.
     ///
     /// # Errors
     /// A message in the user's terms: nothing was pressed there, by one board, or hard enough.
     pub fn read(folder: &Path, wanted: Wanted) -> anyhow::Result<Self> {
-        let about = About::read(folder)?.with_context(|| {
+        let about = PressedPart::read(folder)?.with_context(|| {
             format!(
                 "{}: nothing was collected there. `hapdef collect --out` names such a folder",
                 folder.display()
@@ -120,7 +120,11 @@ fn one_board(presses: &[BenchPress]) -> anyhow::Result<String> {
     Ok(first.map_or(String::new(), |n| format!("{n:08x}")))
 }
 
-fn columns(wanted: Wanted, about: &About, presses: &[BenchPress]) -> anyhow::Result<Columns> {
+fn columns(
+    wanted: Wanted,
+    about: &PressedPart,
+    presses: &[BenchPress],
+) -> anyhow::Result<TouchColumns> {
     let machine = machine_file::parse(&about.machine)
         .map_err(anyhow::Error::msg)?
         .machine;
@@ -134,7 +138,7 @@ fn columns(wanted: Wanted, about: &About, presses: &[BenchPress]) -> anyhow::Res
         let s = sensor?;
         Some((counts.get(s.channel)? - rest.get(s.channel)?) * s.newton_per_count)
     };
-    let mut columns = Columns::default();
+    let mut columns = TouchColumns::default();
     for press in presses {
         let chain = Chain {
             gauge_factor: about.gauge_factor,

@@ -9,7 +9,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::asked::BenchRequest;
-use crate::bench::{Machine, MachineReach, Mount, plan};
+use crate::bench::{Machine, MachineReach, TableMount, plan};
 use crate::design::{DesignError, Inputs, Sensing, check_reach};
 use crate::io::{bench_folder, points};
 use crate::plain;
@@ -62,7 +62,7 @@ pub(super) fn reached(
     places: &[DVec3],
     sensing: &Sensing,
     machine: &Machine,
-    mount: &Mount,
+    mount: &TableMount,
 ) -> anyhow::Result<MachineReach> {
     let surface = &sensing.drawn.map.mesh;
     let on_surface: Vec<(DVec3, DVec3)> = (places.iter())

@@ -10,9 +10,10 @@ use glam::DVec3;
 use super::asked::BenchRequest;
 use super::places::{places, reached};
 use super::reference::reference;
-use super::run::Run;
+use super::run::PressingRun;
 use crate::bench::{
-    Collector, Ended, Limits, Machine, MachineReach, Mount, News, Planned, Reference,
+    CheckPlace, Collector, CollectorNews, Machine, MachineReach, Planned, PressLimits, RunEnd,
+    TableMount,
 };
 use crate::design::{Inputs, Sensing};
 use crate::io::bench_folder;
@@ -28,7 +29,7 @@ pub struct Ready {
     /// What presses.
     pub machine: Machine,
     /// How the limb stands in it.
-    pub mount: Mount,
+    pub mount: TableMount,
     /// How far its touched points are from where the limb stands (m).
     pub off: Vec<f64>,
     /// What the machine gets to.
@@ -38,7 +39,7 @@ pub struct Ready {
     /// Presses that are in the folder already.
     pub done: BTreeSet<usize>,
     /// What is pressed again and again.
-    pub reference: Option<Reference>,
+    pub reference: Option<CheckPlace>,
     pub(super) inputs: Inputs,
     pub(super) sensing: Arc<Sensing>,
 }
@@ -49,8 +50,8 @@ impl Ready {
     /// # Errors
     /// A message in the user's terms: a machine that gets nowhere, points of another limb, a folder that cannot be read or
     /// written.
-    pub fn new(run: Run, inputs: Inputs, sensing: Arc<Sensing>) -> anyhow::Result<Self> {
-        let Run {
+    pub fn new(run: PressingRun, inputs: Inputs, sensing: Arc<Sensing>) -> anyhow::Result<Self> {
+        let PressingRun {
             asked,
             folder,
             about,
@@ -127,12 +128,12 @@ impl Ready {
     /// Goes through what is left of it and `wanted`, by number.
     pub(super) fn collector_of(&self, wanted: &dyn Fn(usize) -> bool) -> Collector {
         let asked = &self.asked;
-        let limits = Limits {
+        let limits = PressLimits {
             step: asked.step_mm * 1e-3,
             depth: asked.depth_mm * 1e-3,
             enough: asked.force_n,
             most_force: asked.most_force_n,
-            ..Limits::default()
+            ..PressLimits::default()
         };
         let collector = Collector::new(
             self.machine.clone(),
@@ -159,9 +160,9 @@ impl Ready {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn keep(&self, news: &News) -> anyhow::Result<()> {
+    pub fn keep(&self, news: &CollectorNews) -> anyhow::Result<()> {
         match news {
-            News::Answer(answer) => Ok(bench_folder::write_answer(&self.folder, answer)?),
+            CollectorNews::Answer(answer) => Ok(bench_folder::write_answer(&self.folder, answer)?),
             _ => Ok(()),
         }
     }
@@ -175,8 +176,8 @@ impl Ready {
         collector: &mut Collector,
         ports: (&Address, &Address),
         orders: &mut dyn FnMut() -> Option<BenchOrder>,
-        tell: impl FnMut(News),
-    ) -> anyhow::Result<Ended> {
+        tell: impl FnMut(CollectorNews),
+    ) -> anyhow::Result<RunEnd> {
         let recorder = self.recorder()?;
         press_at_ports(collector, ports, recorder, orders, tell).map_err(anyhow::Error::msg)
     }

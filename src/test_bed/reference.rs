@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::asked::BenchRequest;
 use super::places::reached;
-use crate::bench::{Machine, Mount, Planned, Reference};
+use crate::bench::{CheckPlace, Machine, Planned, TableMount};
 use crate::design::{Inputs, Sensing};
 use crate::elasticity::Touch;
 use crate::io::bench_folder;
@@ -20,8 +20,8 @@ pub(super) fn reference(
     folder: &Path,
     inputs: &Inputs,
     sensing: &Sensing,
-    (machine, mount): (&Machine, &Mount),
-) -> anyhow::Result<Option<Reference>> {
+    (machine, mount): (&Machine, &TableMount),
+) -> anyhow::Result<Option<CheckPlace>> {
     if asked.check == 0 {
         return Ok(None);
     }
@@ -35,7 +35,7 @@ pub(super) fn reference(
     let Some((_, at)) = best.filter(|(change, _)| *change > 0.0) else {
         return Ok(None);
     };
-    Ok(Some(Reference {
+    Ok(Some(CheckPlace {
         at: *at,
         every: asked.check,
         answer: bench_folder::read_answer(folder)?,

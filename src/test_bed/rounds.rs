@@ -12,21 +12,21 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::dataset::{Collected, Wanted};
+use super::dataset::{CollectedRun, Wanted};
 use super::ready::{Ready, pressed};
 use crate::budget::Watch;
 use crate::dataset::SignalMatrix;
 use crate::design::{PressLessons, Taught, most_telling};
-use crate::learning::{ByModel, Lessons};
+use crate::learning::{ByModel, MeasuredTouches};
 use crate::regression::Grouping;
 use crate::regression::folds::number_of;
 use crate::regression::tune::distances;
 use crate::statistics::{mean, quantile};
-use crate::uncertainty::Pressing;
+use crate::uncertainty::HandPressing;
 
 /// What a run is to reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Goal {
+pub struct RunGoal {
     /// How near nine of ten presses that nothing has learned from are to be found (mm).
     pub mm: f64,
     /// Presses between two looks.
@@ -49,12 +49,12 @@ pub struct Met {
     /// See [`Self::learned_from`].
     pub held_out: usize,
     /// How far off these are; none before there are any.
-    pub errors: Option<Errors>,
+    pub errors: Option<PressErrors>,
 }
 
 /// How far off some presses are (mm).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Errors {
+pub struct PressErrors {
     /// On the mean.
     pub mean_mm: f64,
     /// Half of them.
@@ -76,7 +76,7 @@ pub enum Round {
 }
 
 impl Met {
-    fn is_within(&self, goal: &Goal) -> bool {
+    fn is_within(&self, goal: &RunGoal) -> bool {
         self.held_out >= FEWEST && self.errors.is_some_and(|e| e.p90_mm <= goal.mm)
     }
 }
@@ -88,7 +88,7 @@ impl Ready {
     /// A message in the user's terms: presses of a tip without a sensor, or recordings that cannot be read.
     pub fn next_round(
         &self,
-        goal: &Goal,
+        goal: &RunGoal,
         failed: &BTreeSet<usize>,
         watch: Watch,
     ) -> anyhow::Result<(Met, Round)> {
@@ -156,7 +156,7 @@ impl Ready {
             least_force: Wanted::default().least_force.min(self.asked.force_n / 2.0),
             ..Wanted::default()
         };
-        let collected = begun.then(|| Collected::read(&self.folder, wanted));
+        let collected = begun.then(|| CollectedRun::read(&self.folder, wanted));
         let nothing = || {
             (
                 SignalMatrix::new(0, Vec::new()),
@@ -170,7 +170,7 @@ impl Ready {
                 let (data, _) = collected.data();
                 (data.x, data.targets, data.forces, collected.columns.groups)
             });
-        let lessons = Lessons {
+        let lessons = MeasuredTouches {
             x: &x,
             places_mm: &places,
             forces: &forces,
@@ -179,7 +179,7 @@ impl Ready {
         let is_judged = |t: &usize| held_out.contains(&(numbers[*t] as usize));
         let (judged, learned): (Vec<usize>, Vec<usize>) = (0..numbers.len()).partition(is_judged);
         let project = &self.inputs.project;
-        let presses = PressLessons::new(&self.sensing, project, &lessons, Pressing::EXACT)
+        let presses = PressLessons::new(&self.sensing, project, &lessons, HandPressing::EXACT)
             .with_context(|| self.folder.display().to_string())?;
         let taught = presses.teach(&learned, ByModel::MatchingRemainder, watch)?;
         let answers = taught.find(&x.select_columns(&judged));
@@ -197,9 +197,9 @@ impl Ready {
 }
 
 /// Of the distances (mm) of some presses.
-fn of(mut distances: Vec<f64>) -> Option<Errors> {
+fn of(mut distances: Vec<f64>) -> Option<PressErrors> {
     distances.sort_by(f64::total_cmp);
-    Some(Errors {
+    Some(PressErrors {
         median_mm: quantile(&distances, 0.5)?,
         p90_mm: quantile(&distances, 0.9)?,
         mean_mm: mean(&distances),

@@ -7,21 +7,21 @@ use anyhow::ensure;
 use super::asked::BenchRequest;
 use super::places::points_of;
 use crate::design::Inputs;
-use crate::io::bench_folder::{self, About, limb_key};
+use crate::io::bench_folder::{self, PressedPart, limb_key};
 use crate::io::machine_file::{self, MachineFile};
 use crate::io::source;
 
 /// What is to be pressed into a folder.
-pub struct Run {
+pub struct PressingRun {
     pub(super) asked: BenchRequest,
     pub(super) folder: PathBuf,
-    pub(super) about: About,
+    pub(super) about: PressedPart,
     pub(super) file: MachineFile,
     /// Whether the folder holds a part of it already.
     pub begun: bool,
 }
 
-impl Run {
+impl PressingRun {
     /// Of a project, into a folder, which need not be there yet.
     ///
     /// # Errors
@@ -29,7 +29,7 @@ impl Run {
     /// that something else was begun in.
     pub fn new(asked: BenchRequest, inputs: &Inputs, folder: &Path) -> anyhow::Result<Self> {
         let (about, file) = about(&asked, inputs)?;
-        let before = About::read(folder)?;
+        let before = PressedPart::read(folder)?;
         // A plan of which nothing was pressed yet gives way to another one.
         let pressed = before.is_some() && !bench_folder::parts(folder)?.is_empty();
         let before = before.filter(|_| pressed);
@@ -50,7 +50,7 @@ impl Run {
 }
 
 /// What is written of it, and its machine.
-fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(About, MachineFile)> {
+fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(PressedPart, MachineFile)> {
     let project = &inputs.project;
     let gauges = project.selection.sites.len();
     ensure!(
@@ -76,8 +76,8 @@ fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(About, Machin
         sensor.channel = gauges;
     }
     let settings = project.live.settings(gauges);
-    let about = About {
-        format: About::format(),
+    let about = PressedPart {
+        format: PressedPart::format(),
         limb: limb_key(inputs),
         machine: text,
         seed: project.budget.seed,
@@ -94,7 +94,7 @@ fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(About, Machin
 }
 
 /// A run is gone on with only as it was begun.
-fn same(before: &About, now: &About, folder: &Path) -> anyhow::Result<()> {
+fn same(before: &PressedPart, now: &PressedPart, folder: &Path) -> anyhow::Result<()> {
     let what = if before.limb != now.limb {
         "another limb or other gauges"
     } else if before.machine != now.machine {

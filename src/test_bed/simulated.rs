@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::asked::Flaws;
 use super::ready::Ready;
-use crate::bench::{Collector, Contact, Ended, News, PrinterFaults, SimulatedPrinter};
-use crate::board::{Faults, Options, Script, SimulatedBoard};
+use crate::bench::{Collector, CollectorNews, ContactLaw, PrinterFaults, RunEnd, SimulatedPrinter};
+use crate::board::{BoardOptions, Faults, PressScript, SimulatedBoard};
 use crate::budget::Watch;
 use crate::design::DesignError;
 use crate::design::simulated_board::{gives_way, options, simulated};
@@ -28,8 +28,8 @@ pub fn press_on_simulated(
     collector: &mut Collector,
     watch: Watch,
     orders: &mut dyn FnMut() -> Option<BenchOrder>,
-    tell: impl FnMut(News),
-) -> anyhow::Result<Ended> {
+    tell: impl FnMut(CollectorNews),
+) -> anyhow::Result<RunEnd> {
     let flaws = &ready.asked.simulated.clone().unwrap_or_default();
     let machine = &ready.machine;
     let touches: Vec<Touch> = (ready.reach.presses.iter())
@@ -43,7 +43,7 @@ pub fn press_on_simulated(
     let (gives, board) = built(ready, flaws, &touches, watch)?;
     let mut mount = ready.mount;
     mount.shift += DVec3::new(1.0, 1.0, 0.0).normalize() * flaws.askew_mm * 1e-3;
-    let contact = Contact {
+    let contact = ContactLaw {
         surface: &ready.sensing.drawn.map.mesh,
         mount,
         machine,
@@ -65,7 +65,7 @@ fn built(
 ) -> Result<(Vec<f64>, SimulatedBoard), DesignError> {
     let (inputs, sensing) = (&ready.inputs, &*ready.sensing);
     let gives = gives_way(inputs, sensing, touches, watch)?;
-    let options = Options {
+    let options = BoardOptions {
         tip_n: ready.machine.sensor.map(|s| s.newton_per_count),
         ..options(inputs, sensing.gauges.len() + 1)
     };
@@ -73,7 +73,7 @@ fn built(
         inputs,
         sensing,
         flaws.workshop,
-        Script::Held(None, 0),
+        PressScript::Held(None, 0),
         Some(ready.asked.most_force_n),
         options,
         Faults::default(),

@@ -1,6 +1,6 @@
 //! Which settings no other beats, and which of them answers what is asked for.
 
-use super::{Measured, Point};
+use super::{Measured, TradePoint};
 use crate::project::Project;
 use crate::statistics::median;
 
@@ -16,8 +16,8 @@ pub enum TradeConstraint {
 /// The points that answer the project's question and that no other such point beats in both time and error,
 /// the quickest first. A point that costs the same and errs the same as another is kept once.
 #[must_use]
-pub fn front<'a>(project: &Project, points: &'a [Point]) -> Vec<&'a Point> {
-    let mut own: Vec<(&Point, &Measured)> = points
+pub fn front<'a>(project: &Project, points: &'a [TradePoint]) -> Vec<&'a TradePoint> {
+    let mut own: Vec<(&TradePoint, &Measured)> = points
         .iter()
         .filter(|p| p.setting.answers(project))
         .filter_map(|p| Some((p, p.measured()?)))
@@ -38,8 +38,8 @@ pub fn front<'a>(project: &Project, points: &'a [Point]) -> Vec<&'a Point> {
 /// Seconds by the clock a processor second: the median over all points, so that what else ran on the machine while
 /// one of them was measured does not count.
 #[must_use]
-pub fn clock(points: &[Point]) -> f64 {
-    let measured = points.iter().filter_map(Point::measured);
+pub fn clock(points: &[TradePoint]) -> f64 {
+    let measured = points.iter().filter_map(TradePoint::measured);
     let ratios = measured.map(|m| m.seconds / m.cpu_seconds);
     median(ratios.filter(|r| r.is_finite() && *r > 0.0)).unwrap_or(1.0)
 }
@@ -47,9 +47,13 @@ pub fn clock(points: &[Point]) -> f64 {
 /// The point of a front that keeps a promise: the most accurate within the time, or the quickest within the
 /// error. Nothing where none does. `clock` is how many seconds pass for one of the processor ([`clock`]).
 #[must_use]
-pub fn answer<'a>(front: &[&'a Point], asked: TradeConstraint, clock: f64) -> Option<&'a Point> {
+pub fn answer<'a>(
+    front: &[&'a TradePoint],
+    asked: TradeConstraint,
+    clock: f64,
+) -> Option<&'a TradePoint> {
     let fits =
-        |point: &&&Point, fits: &dyn Fn(&Measured) -> bool| point.measured().is_some_and(fits);
+        |point: &&&TradePoint, fits: &dyn Fn(&Measured) -> bool| point.measured().is_some_and(fits);
     let found = match asked {
         TradeConstraint::Within(seconds) => {
             let in_time = |m: &Measured| m.cpu_seconds * clock <= seconds;
@@ -69,14 +73,14 @@ mod tests {
     use super::*;
     use crate::budget::Quality;
     use crate::evaluation::EstimatorKind;
-    use crate::trade::Setting;
+    use crate::trade::TradeSetting;
 
-    fn point(repeat: u64, cpu_seconds: f64, error_mm: f64) -> Point {
+    fn point(repeat: u64, cpu_seconds: f64, error_mm: f64) -> TradePoint {
         let project = Project::around("a.stl", None);
-        Point {
-            setting: Setting {
+        TradePoint {
+            setting: TradeSetting {
                 repeat,
-                ..Setting::named(&project, Quality::Draft)
+                ..TradeSetting::named(&project, Quality::Draft)
             },
             outcome: Ok(Measured::made_up(cpu_seconds, error_mm)),
         }
@@ -94,7 +98,7 @@ mod tests {
             point(1, 1.0, 0.1),
             point(0, 0.5, f64::NAN),
         ];
-        points.push(Point {
+        points.push(TradePoint {
             outcome: Err("no room".into()),
             ..point(0, 0.1, 0.1)
         });
@@ -108,7 +112,7 @@ mod tests {
         assert_eq!(figures, [6.0, 3.0, 2.0]);
         let found = |asked| {
             answer(&kept, asked, 0.5)
-                .and_then(Point::measured)
+                .and_then(TradePoint::measured)
                 .map(|m| m.error_mm)
         };
         assert_eq!(found(TradeConstraint::Within(2.5)), Some(3.0));

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Knob, Measured, Point};
+use super::{Knob, Measured, TradePoint};
 use crate::statistics::midpoint_median;
 
 /// What turning a knob up brought.
@@ -43,7 +43,7 @@ pub struct KnobReport {
 /// Every knob that was turned, what buys most first; and how far errors of one setting lie apart over its
 /// repeats (standard deviation in % of their mean).
 #[must_use]
-pub fn knobs(points: &[Point]) -> (Vec<KnobReport>, f64) {
+pub fn knobs(points: &[TradePoint]) -> (Vec<KnobReport>, f64) {
     let repeat_scatter = repeat_scatter(points);
     let mut reports: Vec<KnobReport> = Knob::ALL
         .into_iter()
@@ -53,7 +53,7 @@ pub fn knobs(points: &[Point]) -> (Vec<KnobReport>, f64) {
     (reports, repeat_scatter)
 }
 
-fn report(knob: Knob, points: &[Point], repeat_scatter: f64) -> Option<KnobReport> {
+fn report(knob: Knob, points: &[TradePoint], repeat_scatter: f64) -> Option<KnobReport> {
     /// A step that moves the time by less is free, and one that moves the error by less does not (%).
     const FREE: f64 = 5.0;
     const STILL: f64 = 3.0;
@@ -111,9 +111,9 @@ fn scatter(changes: &[f64], repeat_scatter: f64) -> f64 {
 }
 
 /// Settings one step of a knob apart, the lower first.
-fn pairs(knob: Knob, points: &[Point]) -> Vec<(&Measured, &Measured)> {
+fn pairs(knob: Knob, points: &[TradePoint]) -> Vec<(&Measured, &Measured)> {
     let mut found = Vec::new();
-    let single: Vec<&Point> = points.iter().filter(|p| p.setting.repeat == 0).collect();
+    let single: Vec<&TradePoint> = points.iter().filter(|p| p.setting.repeat == 0).collect();
     for a in &single {
         for b in &single {
             if a.setting.rank(knob) < b.setting.rank(knob)
@@ -129,15 +129,15 @@ fn pairs(knob: Knob, points: &[Point]) -> Vec<(&Measured, &Measured)> {
 }
 
 /// How far the errors of repeats lie apart (% of their mean); zero where there are none.
-fn repeat_scatter(points: &[Point]) -> f64 {
+fn repeat_scatter(points: &[TradePoint]) -> f64 {
     let Some(first) = points.iter().find(|p| p.setting.repeat > 0) else {
         return 0.0;
     };
-    let same = |p: &&Point| {
-        super::Setting {
+    let same = |p: &&TradePoint| {
+        super::TradeSetting {
             repeat: 1,
             ..p.setting
-        } == super::Setting {
+        } == super::TradeSetting {
             repeat: 1,
             ..first.setting
         }
@@ -162,18 +162,18 @@ mod tests {
     use super::*;
     use crate::evaluation::EstimatorKind;
     use crate::project::Project;
-    use crate::trade::Setting;
+    use crate::trade::TradeSetting;
 
     #[test]
     fn a_knob_that_only_costs_is_named() {
         let mut project = Project::around("a.stl", None);
         project.evaluation.estimator = EstimatorKind::Svr;
-        let centre = Setting::centre(&project);
-        let point = |setting: Setting| {
+        let centre = TradeSetting::centre(&project);
+        let point = |setting: TradeSetting| {
             let spent = setting.limits.unwrap();
             let error =
                 4.0 * (1200.0 / spent.vertices as f64).sqrt() + 0.02 * setting.repeat as f64;
-            Point {
+            TradePoint {
                 setting,
                 outcome: Ok(Measured::made_up(
                     spent.folds as f64 + spent.vertices as f64 / 1000.0,
@@ -181,8 +181,8 @@ mod tests {
                 )),
             }
         };
-        let mut points: Vec<Point> = (0..3)
-            .map(|repeat| point(Setting { repeat, ..centre }))
+        let mut points: Vec<TradePoint> = (0..3)
+            .map(|repeat| point(TradeSetting { repeat, ..centre }))
             .collect();
         for knob in [Knob::Vertices, Knob::Folds, Knob::PointTip] {
             points.extend(centre.neighbours(knob).into_iter().map(point));

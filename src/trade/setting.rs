@@ -9,7 +9,7 @@ use super::spent::{
     SELECTION_CANDIDATES, SELECTION_TOUCHES, SIGNALS, SVR_TOLERANCE_MM, Spent, TOUCHES,
     TUNING_TOUCHES, UNEXPLAINED, USUAL, USUAL_UNEXPLAINED, VERTICES,
 };
-use crate::budget::{Budget, Limits, Quality};
+use crate::budget::{Budget, BudgetLimits, Quality};
 use crate::dataset::Signal;
 use crate::design::{Inputs, walled};
 use crate::evaluation::EstimatorKind;
@@ -18,7 +18,7 @@ use crate::project::{BadValue, Project};
 
 /// A point of the trade: everything that says how much is spent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Setting {
+pub struct TradeSetting {
     /// The quality that what is no knob comes from. A setting without limits is that quality itself.
     pub quality: Quality,
     /// Added to the project's seed: how much an error moves when nothing else does.
@@ -35,7 +35,7 @@ pub struct Setting {
     pub limits: Option<Spent>,
 }
 
-impl Setting {
+impl TradeSetting {
     /// A quality by its name, with the project's own selector, signal, variance and estimator.
     #[must_use]
     pub fn named(project: &Project, quality: Quality) -> Self {
@@ -110,12 +110,12 @@ impl Setting {
         budget
     }
 
-    fn budget_limits(&self) -> Limits {
+    fn budget_limits(&self) -> BudgetLimits {
         let Some(spent) = self.limits else {
-            return Limits::default();
+            return BudgetLimits::default();
         };
         let used = |knob: Knob, count: usize| self.uses(knob).then_some(count);
-        Limits {
+        BudgetLimits {
             elements_percent: Some(ELEMENTS_PERCENT),
             vertices: Some(spent.vertices),
             touches: Some(spent.touches),
@@ -167,7 +167,7 @@ impl Setting {
 
     /// As [`Self::is_of`], at a quality and limits that need not be the project's.
     #[must_use]
-    pub fn is_at(&self, project: &Project, quality: Quality, limits: &Limits) -> bool {
+    pub fn is_at(&self, project: &Project, quality: Quality, limits: &BudgetLimits) -> bool {
         self.answers(project)
             && (quality, *limits) == (self.quality, self.budget_limits())
             && self.selector == project.selection.selector
@@ -419,7 +419,11 @@ fn own_selector(estimator: EstimatorKind) -> SelectorKind {
 }
 
 /// The steps of a ladder below and above a value; the ends of the ladder have one.
-fn beside<T: Copy + PartialOrd>(ladder: &[T], now: T, with: impl Fn(T) -> Setting) -> Vec<Setting> {
+fn beside<T: Copy + PartialOrd>(
+    ladder: &[T],
+    now: T,
+    with: impl Fn(T) -> TradeSetting,
+) -> Vec<TradeSetting> {
     // Ladders fall where less is dearer.
     let falls = ladder.first() > ladder.last();
     let before = |&&step: &&T| if falls { step > now } else { step < now };
@@ -429,7 +433,11 @@ fn beside<T: Copy + PartialOrd>(ladder: &[T], now: T, with: impl Fn(T) -> Settin
     below.into_iter().chain(above).map(|&s| with(s)).collect()
 }
 
-fn others<T: Copy + PartialEq>(all: &[T], now: T, with: impl Fn(T) -> Setting) -> Vec<Setting> {
+fn others<T: Copy + PartialEq>(
+    all: &[T],
+    now: T,
+    with: impl Fn(T) -> TradeSetting,
+) -> Vec<TradeSetting> {
     all.iter()
         .filter(|&&x| x != now)
         .map(|&x| with(x))

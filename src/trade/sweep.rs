@@ -1,6 +1,6 @@
 //! Which setting to measure next: from the middle of every ladder outward, along the front.
 
-use super::{Knob, Point, Setting, front, knobs};
+use super::{Knob, TradePoint, TradeSetting, front, knobs};
 use crate::budget::Quality;
 use crate::project::{ElementKind, PartModel, Project};
 
@@ -33,16 +33,16 @@ impl<'a> Sweep<'a> {
     /// repeats, each knob of it turned by one step, then every neighbour of the front, the cheapest first.
     /// Nothing when all is known or nothing may follow.
     #[must_use]
-    pub fn next(&self, known: &[Point], count: usize) -> Option<Setting> {
+    pub fn next(&self, known: &[TradePoint], count: usize) -> Option<TradeSetting> {
         if count == 0 {
             return None;
         }
-        let is_new = |s: &Setting| known.iter().all(|p| p.setting != *s);
+        let is_new = |s: &TradeSetting| known.iter().all(|p| p.setting != *s);
         let named = self
             .standards
             .iter()
-            .map(|&q| Setting::named(self.project, q));
-        let mut named: Vec<Setting> = named.filter(is_new).collect();
+            .map(|&q| TradeSetting::named(self.project, q));
+        let mut named: Vec<TradeSetting> = named.filter(is_new).collect();
         // What was asked for by name is kept room for.
         if count <= named.len() {
             return Some(named.swap_remove(0));
@@ -54,21 +54,21 @@ impl<'a> Sweep<'a> {
     }
 
     /// The settings that every sweep measures.
-    fn walked(&self) -> Vec<Setting> {
-        let centre = Setting::centre(self.project);
-        let repeats = (0..=REPEATS).map(|repeat| Setting { repeat, ..centre });
+    fn walked(&self) -> Vec<TradeSetting> {
+        let centre = TradeSetting::centre(self.project);
+        let repeats = (0..=REPEATS).map(|repeat| TradeSetting { repeat, ..centre });
         let turned = Knob::ALL
             .into_iter()
             .flat_map(|knob| centre.neighbours(knob))
             .filter(|s| self.is_possible(s));
-        let fine = Some(Setting::fine(self.project)).filter(|s| self.is_possible(s));
+        let fine = Some(TradeSetting::fine(self.project)).filter(|s| self.is_possible(s));
         repeats.chain(turned).chain(fine).collect()
     }
 
     /// What lies one step from the front: from its two ends inward, and at each of its points the knobs first that
     /// moved the error most. Knobs that nobody is offered are turned around the most accurate point, and elsewhere
     /// until it is known what they do.
-    fn beside_the_front(&self, known: &[Point]) -> Vec<Setting> {
+    fn beside_the_front(&self, known: &[TradePoint]) -> Vec<TradeSetting> {
         let mut front = front(self.project, known);
         let best = front.iter().rfind(|p| p.setting.limits.is_some());
         let best = best.map(|p| p.setting);
@@ -79,7 +79,7 @@ impl<'a> Sweep<'a> {
             report.map_or(0.0, |r| -r.error_percent.abs())
         };
         order.sort_by(|a, b| moved(a).total_cmp(&moved(b)));
-        let turned = |s: &Setting| -> Vec<Setting> {
+        let turned = |s: &TradeSetting| -> Vec<TradeSetting> {
             let known = |knob: Knob| {
                 let report = reports.iter().find(|r| r.knob == knob);
                 report.is_some_and(|r| r.pairs >= ENOUGH)
@@ -112,9 +112,9 @@ impl<'a> Sweep<'a> {
 
     /// What is another computation at all: a solid is no shell whose wall could be taken as one, touches beyond the
     /// project's own are not there to be pressed or looked at, and a part's own triangles are as many as they are.
-    fn is_possible(&self, setting: &Setting) -> bool {
+    fn is_possible(&self, setting: &TradeSetting) -> bool {
         let project = self.project;
-        let centre = Setting::centre(project);
+        let centre = TradeSetting::centre(project);
         let (Some(spent), Some(usual)) = (setting.limits, centre.limits) else {
             return true;
         };
@@ -136,7 +136,7 @@ mod tests {
     use crate::trade::Measured;
 
     /// A made-up limb: every knob costs, vertices and touches buy.
-    fn made_up(setting: &Setting) -> Point {
+    fn made_up(setting: &TradeSetting) -> TradePoint {
         let (cost, error) = match &setting.limits {
             Some(s) => (
                 (s.vertices * s.touches) as f64 / 1e5 + s.folds as f64,
@@ -144,7 +144,7 @@ mod tests {
             ),
             None => (1e6, 5.0),
         };
-        Point {
+        TradePoint {
             setting: *setting,
             outcome: Ok(Measured::made_up(cost, error)),
         }
@@ -154,7 +154,7 @@ mod tests {
     fn a_walk_measures_nothing_twice_and_reaches_the_ends_of_what_buys() {
         let project = Project::around("a.stl", None);
         let sweep = Sweep::new(&project, standards());
-        let mut known: Vec<Point> = Vec::new();
+        let mut known: Vec<TradePoint> = Vec::new();
         for left in (0..250).rev() {
             let Some(next) = sweep.next(&known, left) else {
                 break;
@@ -171,7 +171,7 @@ mod tests {
         );
         assert!(spent.clone().any(|s| s.vertices == 300 && s.touches == 100));
         for quality in standards() {
-            let named = Setting::named(&project, quality);
+            let named = TradeSetting::named(&project, quality);
             assert!(known.iter().any(|p| p.setting == named));
         }
     }

@@ -13,11 +13,11 @@ use crate::io::opening::{bundled, open};
 use crate::io::project_file::{self, LoadedProject};
 use crate::io::study_folder::fingerprint;
 use crate::io::{atomic, glb, mesh_file, source};
-use crate::parameter_study::{Axis, ParameterStudy, Points, Subject};
+use crate::parameter_study::{ParameterStudy, Points, StudyAxis, Subject};
 use crate::project::{Masks, Project};
 
 /// What the units of a study are made of.
-pub struct Base {
+pub struct UnitBase {
     /// The folder that paths of the study start from.
     home: PathBuf,
     from: From,
@@ -29,7 +29,7 @@ enum From {
     File(PathBuf),
 }
 
-impl Base {
+impl UnitBase {
     /// For the units of a study whose paths start from a folder.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ impl Base {
     #[must_use]
     pub fn meshes(&self, study: &ParameterStudy) -> BTreeMap<String, String> {
         let axes = (study.axes.iter()).filter(|a| matches!(a.subject(), Ok(Subject::Mesh)));
-        let names: BTreeSet<String> = axes.flat_map(Axis::named).map(String::from).collect();
+        let names: BTreeSet<String> = axes.flat_map(StudyAxis::named).map(String::from).collect();
         let keyed = |name: String| (self.mesh_key(&name), name);
         let found = names.into_iter().map(keyed);
         found.map(|(key, name)| (name, key)).collect()
@@ -289,7 +289,7 @@ fn from_limb(study: &ParameterStudy, values: &[Value]) -> anyhow::Result<LoadedP
 
 /// The options of `hapdef limb`, for themselves.
 #[derive(clap::Parser)]
-struct Options {
+struct LimbFlags {
     #[command(flatten)]
     limb: LimbOptions,
 }
@@ -317,7 +317,7 @@ fn limb_args(study: &ParameterStudy, values: &[Value]) -> anyhow::Result<Option<
         let line = text.lines().next().unwrap_or_default();
         anyhow!("{}", line.trim_start_matches("error: "))
     };
-    Ok(Some(Options::try_parse_from(words).map_err(said)?.limb))
+    Ok(Some(LimbFlags::try_parse_from(words).map_err(said)?.limb))
 }
 
 /// Sets the keys of a unit in a project's table.

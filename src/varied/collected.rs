@@ -7,15 +7,15 @@ use serde_json::Value;
 
 use crate::budget::{Watch, report};
 use crate::io::FileError;
-use crate::io::study_folder::{Outcome, StudyFolder, in_a_cell, plain};
+use crate::io::study_folder::{StudyFolder, UnitOutcome, in_a_cell, plain};
 use crate::parameter_study::{Points, front};
 use crate::plain as words;
 
 /// One unit with what came of it.
-pub struct Row {
+pub struct UnitRow {
     /// Of each axis.
     pub values: Vec<Value>,
-    pub outcome: Option<Outcome>,
+    pub outcome: Option<UnitOutcome>,
     pub figures: BTreeMap<String, f64>,
     /// Whether it keeps all that is required.
     pub allowed: bool,
@@ -23,7 +23,7 @@ pub struct Row {
     pub on_front: bool,
 }
 
-impl Row {
+impl UnitRow {
     #[must_use]
     pub fn state(&self) -> &'static str {
         match &self.outcome {
@@ -35,14 +35,14 @@ impl Row {
 }
 
 /// All units of a study, in their order.
-pub struct Collected {
+pub struct CollectedUnits {
     pub folder: StudyFolder,
     /// Names of the figures, in the order in which units have them.
     pub names: Vec<String>,
-    pub rows: Vec<Row>,
+    pub rows: Vec<UnitRow>,
 }
 
-impl Collected {
+impl CollectedUnits {
     /// Of a folder, as far as it was computed. `watch` is told of every unit that is read, and may end it.
     ///
     /// # Errors
@@ -62,7 +62,7 @@ impl Collected {
                 }
             }
             let figures = all.filter_map(|(name, value)| Some((name.clone(), (*value)?)));
-            rows.push(Row {
+            rows.push(UnitRow {
                 values: points.values(unit).iter().map(plain).collect(),
                 figures: figures.collect(),
                 outcome,
@@ -106,7 +106,7 @@ impl Collected {
         if aim.minimize.is_empty() {
             return Ok(());
         }
-        let numbers = |row: &Row| -> Vec<f64> {
+        let numbers = |row: &UnitRow| -> Vec<f64> {
             let value = |name: &String| row.figures.get(name).copied();
             let all = aim.minimize.iter().map(value);
             all.map(|v| v.filter(|_| row.allowed).unwrap_or(f64::NAN))

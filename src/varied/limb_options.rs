@@ -6,7 +6,9 @@ use crate::limb::barrel::BarrelSpec;
 use crate::limb::{BoxMm, LimbSpec, LimbSupport};
 use crate::mesh::TriMesh;
 use crate::mesh::unroll::Axis;
-use crate::project::{Lattice, PartAxis, PartModel, Project, RegionKeys, SupportKeys, SupportKind};
+use crate::project::{
+    PartAxis, PartModel, Project, RegionKeys, SiteLattice, SupportKeys, SupportKind,
+};
 
 /// What a limb's wall is made of.
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,7 +130,7 @@ fn set(value: &mut f64, given: Option<f64>) {
 }
 
 /// A limb before it is written.
-pub struct Made {
+pub struct MadeLimb {
     /// Of its files, without their endings.
     pub name: &'static str,
     pub mesh: TriMesh,
@@ -140,7 +142,7 @@ pub struct Made {
 ///
 /// # Errors
 /// What cannot be made of these options.
-pub fn made(args: &LimbOptions) -> anyhow::Result<Made> {
+pub fn made(args: &LimbOptions) -> anyhow::Result<MadeLimb> {
     anyhow::ensure!(
         args.columns != Some(0) && args.hoops.is_none_or(|h| h >= 2),
         "a limb has at least one column and two hoops"
@@ -151,13 +153,13 @@ pub fn made(args: &LimbOptions) -> anyhow::Result<Made> {
     }
 }
 
-fn tube(args: &LimbOptions) -> anyhow::Result<Made> {
+fn tube(args: &LimbOptions) -> anyhow::Result<MadeLimb> {
     let spec = args.spec();
     let (mut mesh, boxes) = spec.build()?;
     let mut project = Project::around("limb.glb", None);
     project.part.axis = PartAxis::Coordinate(Axis::Z);
     project.supports = clamped(&boxes);
-    project.sites.lattice = Lattice::Unrolled;
+    project.sites.lattice = SiteLattice::Unrolled;
     let wide = (2.0 * spec.radius() * spec.taper.max(1.0)).ceil().max(80.0);
     let top = spec.height - 12.0;
     project.evaluation.regions = vec![away([-wide, -wide, 12.0], [wide, wide, top])];
@@ -166,7 +168,7 @@ fn tube(args: &LimbOptions) -> anyhow::Result<Made> {
         mesh = mesh.thickened(project.part.thickness());
         thicken(&mut project);
     }
-    Ok(Made {
+    Ok(MadeLimb {
         name: "limb",
         mesh,
         project,
@@ -175,7 +177,7 @@ fn tube(args: &LimbOptions) -> anyhow::Result<Made> {
 }
 
 /// A barrel is a solid as it is.
-fn barrel(args: &LimbOptions) -> anyhow::Result<Made> {
+fn barrel(args: &LimbOptions) -> anyhow::Result<MadeLimb> {
     let spec = args.barrel()?;
     let (mesh, boxes) = spec.build()?;
     let mut project = Project::around("barrel.glb", None);
@@ -186,7 +188,7 @@ fn barrel(args: &LimbOptions) -> anyhow::Result<Made> {
     let wide = (2.0 * spec.radius).ceil();
     let top = spec.height - spec.rim;
     project.evaluation.regions = vec![away([-wide, spec.rim, -wide], [wide, top, wide])];
-    Ok(Made {
+    Ok(MadeLimb {
         name: "barrel",
         mesh,
         project,

@@ -9,8 +9,8 @@ use crc::{CRC_16_IBM_3740, Crc};
 
 use super::MOST_CHANNELS;
 
-pub use decoder::{Decoder, Event};
-pub use message::{Hello, Message};
+pub use decoder::{Decoded, Decoder};
+pub use message::{Hello, WireMessage};
 pub use refusal::Refusal;
 
 use payload::MOST_BITS;
@@ -25,7 +25,7 @@ const SUM: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
 /// Appends a message as a frame with the zero that ends it. Counts are packed with `bits` each; they, texts
 /// and names are cut to what a frame holds.
-pub fn encode(message: &Message, sequence: u16, time_us: u32, bits: u8, out: &mut Vec<u8>) {
+pub fn encode(message: &WireMessage, sequence: u16, time_us: u32, bits: u8, out: &mut Vec<u8>) {
     let mut frame = vec![payload::kind(message)];
     frame.extend(sequence.to_le_bytes());
     frame.extend(time_us.to_le_bytes());
@@ -69,7 +69,7 @@ mod tests {
     /// The frames that the specification shows, byte for byte: firmware is tested against the same.
     #[test]
     fn the_frames_of_the_specification() {
-        let frame = |message: &Message, sequence, time| {
+        let frame = |message: &WireMessage, sequence, time| {
             let mut out = Vec::new();
             encode(message, sequence, time, 12, &mut out);
             hex(&out)
@@ -77,20 +77,20 @@ mod tests {
         let spec = include_str!("../../assets/firmware/PROTOCOL.md");
         let counts: Vec<u32> = (0..12).map(|k| 2048 + 100 * k).collect();
         for (message, sequence, time) in [
-            (Message::Hello(board()), 0, 0),
-            (Message::Data(counts), 1, 1000),
-            (Message::Data(vec![0; 12]), 2, 2000),
+            (WireMessage::Hello(board()), 0, 0),
+            (WireMessage::Data(counts), 1, 1000),
+            (WireMessage::Data(vec![0; 12]), 2, 2000),
             (
-                Message::Status {
+                WireMessage::Status {
                     overruns: 3,
                     temperature_centi: Some(2150),
                 },
                 3,
                 3000,
             ),
-            (Message::Note("tare".into()), 4, 4000),
-            (Message::Start, 0, 0),
-            (Message::Rate(500), 1, 0),
+            (WireMessage::Note("tare".into()), 4, 4000),
+            (WireMessage::Start, 0, 0),
+            (WireMessage::Rate(500), 1, 0),
         ] {
             let bytes = frame(&message, sequence, time);
             assert!(spec.contains(&bytes), "{message:?}: {bytes}");
@@ -101,25 +101,25 @@ mod tests {
     fn every_message_comes_through_in_whatever_pieces() {
         let counts: Vec<u32> = (0..12).map(|k| (k * 379) % 4096).collect();
         let all = [
-            Message::Hello(board()),
-            Message::Data(counts),
-            Message::Data(vec![0; 12]),
-            Message::Data(vec![4095; 12]),
-            Message::Status {
+            WireMessage::Hello(board()),
+            WireMessage::Data(counts),
+            WireMessage::Data(vec![0; 12]),
+            WireMessage::Data(vec![4095; 12]),
+            WireMessage::Status {
                 overruns: 7,
                 temperature_centi: None,
             },
-            Message::Log {
+            WireMessage::Log {
                 level: 2,
                 text: "bridge 3 open – µ".into(),
             },
-            Message::Pong(0x0102_0304),
-            Message::Note("rest 0 2048.5 1.25".into()),
-            Message::AskHello,
-            Message::Start,
-            Message::Stop,
-            Message::Rate(1000),
-            Message::Ping(9),
+            WireMessage::Pong(0x0102_0304),
+            WireMessage::Note("rest 0 2048.5 1.25".into()),
+            WireMessage::AskHello,
+            WireMessage::Start,
+            WireMessage::Stop,
+            WireMessage::Rate(1000),
+            WireMessage::Ping(9),
         ];
         let mut bytes = vec![0x55, 0x00, 0x00];
         for (k, message) in (0..).zip(&all) {
@@ -130,7 +130,7 @@ mod tests {
             let mut found = Vec::new();
             for part in bytes.chunks(piece) {
                 decoder.push(part, |event| {
-                    if let Event::Message { message, .. } = event {
+                    if let Decoded::Message { message, .. } = event {
                         found.push(message);
                     }
                 });
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn twelve_channels_take_twenty_nine_bytes() {
         let mut out = Vec::new();
-        encode(&Message::Data(vec![1234; 12]), 9, 77, 12, &mut out);
+        encode(&WireMessage::Data(vec![1234; 12]), 9, 77, 12, &mut out);
         assert_eq!(out.len(), 29);
     }
 }

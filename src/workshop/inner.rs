@@ -10,7 +10,7 @@ use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A gauge on the wall's inner face.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Glued {
+pub struct GluedGauge {
     /// From 1.
     pub number: usize,
     /// On the inner face; its normal is from the inside to the outside.
@@ -30,7 +30,7 @@ pub struct Inner {
     /// Which way the part stands.
     pub stance: Stance,
     /// The chosen gauges.
-    pub gauges: Vec<Glued>,
+    pub gauges: Vec<GluedGauge>,
 }
 
 impl Inner {
@@ -47,7 +47,7 @@ impl Inner {
             let ends = row
                 .iter()
                 .fold([0.0_f64; 2], |[l, h], v| [l.min(*v), h.max(*v)]);
-            Glued {
+            GluedGauge {
                 number,
                 gauge: face.gauge(&site.gauge),
                 strain: ends,
@@ -76,7 +76,7 @@ impl Inner {
                 position: at,
                 ..Gauge::on(part, on, DVec3::from_array(site.direction))
             };
-            Glued {
+            GluedGauge {
                 number,
                 gauge: face.gauge(&on),
                 strain: [0.0; 2],
@@ -93,7 +93,7 @@ impl Inner {
 
     /// A face by itself, which looks outwards, with gauges on it.
     #[must_use]
-    pub fn outward(mesh: TriMesh, stance: Stance, gauges: Vec<Glued>) -> Self {
+    pub fn outward(mesh: TriMesh, stance: Stance, gauges: Vec<GluedGauge>) -> Self {
         Self {
             mesh,
             face: InnerFace::OUTWARD,
@@ -105,7 +105,7 @@ impl Inner {
     /// The gauges as a jig presses them.
     #[must_use]
     pub fn pressed(&self) -> Vec<PressedGauge> {
-        let of = |g: &Glued| PressedGauge {
+        let of = |g: &GluedGauge| PressedGauge {
             number: g.number,
             gauge: g.gauge,
         };

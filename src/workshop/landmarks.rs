@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use super::inner::{Glued, Inner};
+use super::inner::{GluedGauge, Inner};
 use crate::mesh::flatten::Flat;
 
 /// Another gauge nearby.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Neighbour {
+pub struct NearbyGauge {
     /// Its number.
     pub number: usize,
     /// Straight from middle to middle (m).
@@ -28,7 +28,7 @@ pub struct Landmarks {
     /// How its direction is turned from the part's axis, clockwise as seen from inside (degrees, -90 to 90).
     pub turned_deg: f64,
     /// The nearest of the others, nearest first.
-    pub neighbours: Vec<Neighbour>,
+    pub neighbours: Vec<NearbyGauge>,
 }
 
 /// Of each gauge, in their order.
@@ -52,7 +52,7 @@ pub fn landmarks(inner: &Inner) -> Vec<Landmarks> {
 
 fn of(
     inner: &Inner,
-    glued: &Glued,
+    glued: &GluedGauge,
     rims: &[[DVec3; 2]],
     (foot, top): (f64, f64),
     axis: Option<DVec3>,
@@ -64,9 +64,9 @@ fn of(
     // A tube is walked around about its own axis, anything else about the origin of the file.
     let arm = glued.gauge.position - axis.unwrap_or(DVec3::ZERO);
     let around = arm.dot(stance.right()).atan2(arm.dot(stance.front()));
-    let mut neighbours: Vec<Neighbour> = (inner.gauges.iter())
+    let mut neighbours: Vec<NearbyGauge> = (inner.gauges.iter())
         .filter(|other| other.number != glued.number)
-        .map(|other| Neighbour {
+        .map(|other| NearbyGauge {
             number: other.number,
             distance: other.gauge.position.distance(glued.gauge.position),
         })
@@ -94,7 +94,7 @@ fn of(
 }
 
 /// Clockwise from up, as seen from inside: a gauge has no front and back.
-fn turned(inner: &Inner, glued: &Glued) -> f64 {
+fn turned(inner: &Inner, glued: &GluedGauge) -> f64 {
     let flat = |d: DVec3| d.reject_from_normalized(glued.gauge.normal);
     let up = flat(inner.stance.up());
     let up = if up.length() > 0.1 {
@@ -151,7 +151,7 @@ mod tests {
             let angle = 0.3 * number as f64;
             let out = stance.front() * angle.cos() + stance.right() * angle.sin();
             let right = out.cross(stance.up());
-            Glued {
+            GluedGauge {
                 number,
                 gauge: Gauge {
                     position: out * 31.8e-3 + stance.up() * z,

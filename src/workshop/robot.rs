@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use glam::{DMat3, DVec3};
 
-use super::inner::Glued;
+use super::inner::GluedGauge;
 
 /// A frame at a gauge: its place (m), and the turn of its axes: x along the gauge, z from the inside to the outside.
 #[must_use]
-pub fn frame(glued: &Glued) -> (DVec3, DMat3) {
+pub fn frame(glued: &GluedGauge) -> (DVec3, DMat3) {
     let z = glued.gauge.normal.normalize_or(DVec3::Z);
     let x = glued.gauge.direction.reject_from_normalized(z);
     let x = x.normalize_or(z.any_orthonormal_vector());
@@ -37,7 +37,7 @@ pub fn turn_of([roll, pitch, yaw]: [f64; 3]) -> DMat3 {
 
 /// A URDF fragment with a link and a fixed joint for each gauge, on the link that the limb is.
 #[must_use]
-pub fn urdf(gauges: &[Glued], robot: &str, link: &str) -> String {
+pub fn urdf(gauges: &[GluedGauge], robot: &str, link: &str) -> String {
     let (robot, link) = (escaped(robot), escaped(link));
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<!-- A frame for each gauge: x along it, z from the inside to the outside. Metres and radians in the frame of \"{link}\".\n     Copy the links and joints into the robot's own description. -->\n<robot name=\"{robot}\">\n  <link name=\"{link}\"/>\n"
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn a_frame_lies_along_its_gauge() {
-        let glued = Glued {
+        let glued = GluedGauge {
             number: 3,
             gauge: Gauge {
                 position: DVec3::new(0.01, 0.02, 0.03),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::inner::Glued;
+use super::inner::GluedGauge;
 use crate::inference::Chain;
 use crate::uncertainty::rounding;
 
@@ -50,7 +50,7 @@ pub struct Wiring {
 /// their heights above the foot of the part (m).
 #[must_use]
 pub fn wiring(
-    gauges: &[Glued],
+    gauges: &[GluedGauge],
     channels: &[usize],
     heights: &[f64],
     chain: Chain,
@@ -61,7 +61,7 @@ pub fn wiring(
     /// From the foot to the plug, and what a cable gives way by (m).
     const SPARE: f64 = 0.15;
     let counts = chain.counts_per_strain();
-    let channel = |(gauge, (&channel, &height)): (&Glued, (&usize, &f64))| Channel {
+    let channel = |(gauge, (&channel, &height)): (&GluedGauge, (&usize, &f64))| Channel {
         gauge: gauge.number,
         channel,
         pin: format!("A{channel}"),
@@ -252,8 +252,8 @@ mod tests {
     use super::*;
     use crate::gauge::Gauge;
 
-    fn gauge(number: usize, strain: [f64; 2]) -> Glued {
-        Glued {
+    fn gauge(number: usize, strain: [f64; 2]) -> GluedGauge {
+        GluedGauge {
             number,
             gauge: Gauge {
                 position: DVec3::ZERO,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::design::{self, Inputs, Sensing, Simulated};
-use hapdef::inference::{Errors, Matching};
+use hapdef::inference::{Matching, ReadingErrors};
 use hapdef::mesh::{SurfacePoint, sample};
 use hapdef::placement::{Selection, SelectorKind};
 use hapdef::project::ChosenSite;
@@ -133,10 +133,10 @@ impl Trial {
             (project.uncertainty()).with_elements_of_gauges(left.reading_percent, length_scale);
         let gluing = off.of_gauges();
         let drawn = &sensing.drawn;
-        let errors = Errors {
+        let errors = ReadingErrors {
             relative: left.strain_percent / 100.0,
             deviations: Some(sensing.deviations.clone()),
-            ..Errors::of_noise(noise, sensing.gauges.len())
+            ..ReadingErrors::of_noise(noise, sensing.gauges.len())
         };
         let mut matching = Matching::new(Arc::clone(&drawn.map), errors, 60.0);
         let mut rng = ChaCha8Rng::seed_from_u64(force.to_bits());

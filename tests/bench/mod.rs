@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use hapdef::budget::unwatched;
-use hapdef::elasticity::{DofSet, Material, Section, ShellModel};
+use hapdef::elasticity::{DofSet, Material, ShellModel, ShellSection};
 use hapdef::mesh::TriMesh;
 
 /// The diagonal that cells are cut along: benchmark figures depend on it.
@@ -42,8 +42,8 @@ pub fn grid(nu: usize, nv: usize, cut: Cut, map: impl Fn(f64, f64) -> DVec3) -> 
     TriMesh::new(&p, &t, 0).unwrap().0
 }
 
-pub fn section(e: f64, nu: f64, thickness: f64) -> Section {
-    Section {
+pub fn section(e: f64, nu: f64, thickness: f64) -> ShellSection {
+    ShellSection {
         material: Material {
             youngs_modulus: e,
             poissons_ratio: nu,
@@ -54,7 +54,7 @@ pub fn section(e: f64, nu: f64, thickness: f64) -> Section {
 
 fn solve(
     mesh: &TriMesh,
-    section: Section,
+    section: ShellSection,
     held: impl Fn(DVec3) -> u8,
     forces: &[(u32, DVec3)],
 ) -> Vec<f64> {

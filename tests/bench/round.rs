@@ -9,7 +9,7 @@ use hapdef::elasticity::estimate::under_load;
 use hapdef::elasticity::grade::{Graded, ShellGround};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::support::HeldRegion;
-use hapdef::elasticity::{DofSet, Model as _, Section, ShellModel, Support, Touch};
+use hapdef::elasticity::{DofSet, Model as _, ShellModel, ShellSection, Support, Touch};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 use super::section;
@@ -56,7 +56,7 @@ pub fn strain_error(
 /// its own to be cut; and a tip in the middle.
 pub struct Disc {
     pub part: Arc<TriMesh>,
-    pub section: Section,
+    pub section: ShellSection,
     pub clear: f64,
     pub touch: Touch,
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::Inputs;
-use hapdef::given::{self, Answer};
+use hapdef::given::{self, GivenAnswer};
 use hapdef::io::mesh_file::read_mesh;
 use hapdef::io::points::{read_sites, read_touches};
 use hapdef::mesh::repair::Repair;
@@ -69,7 +69,7 @@ pub struct Agreement {
     pub under_worst: f64,
     /// Rms of the strain beyond two tip radii over the load's largest there.
     pub strain_rms: f64,
-    pub answer: Answer,
+    pub answer: GivenAnswer,
 }
 
 pub fn agreement(quality: Quality) -> Agreement {

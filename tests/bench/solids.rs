@@ -16,7 +16,7 @@ use hapdef::given::GivenSite;
 use hapdef::io::points::{read_sites, read_touches};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::oriented_box::OrientedBox;
-use hapdef::mesh::walls::Side;
+use hapdef::mesh::walls::WallSide;
 
 /// A surface of quadrangles (each counter-clockwise from outside), cut in two.
 pub fn of_quads(positions: &[DVec3], quads: &[[u32; 4]]) -> Arc<TriMesh> {
@@ -355,8 +355,14 @@ pub fn slotted_graded(aim: &ElementBudget) -> (Found, Discretization) {
     let part = Arc::new(inputs.part.thickened(wall));
     let supports = inputs.project.supports(&inputs.masks).unwrap();
     let material = inputs.project.section().material;
-    let ground =
-        SolidGround::new(&part, material, &supports, &|_| None::<Side>, &unwatched).unwrap();
+    let ground = SolidGround::new(
+        &part,
+        material,
+        &supports,
+        &|_| None::<WallSide>,
+        &unwatched,
+    )
+    .unwrap();
     let places: Vec<DVec3> = (sites.iter())
         .map(|s| s.position - to_outside(s.position, wall))
         .collect();

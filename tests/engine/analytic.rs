@@ -15,7 +15,7 @@ use glam::DVec3;
 use hapdef::budget::unwatched;
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::Face;
-use hapdef::elasticity::{DofSet, Material, Model, Section, ShellModel};
+use hapdef::elasticity::{DofSet, Material, Model, ShellModel, ShellSection};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 fn near(name: &str, computed: f64, known: f64) {
@@ -27,7 +27,7 @@ fn near(name: &str, computed: f64, known: f64) {
 }
 
 /// `MacNeal` and Harder's patch: exact displacements given on the rim; the inner nodes must follow.
-fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, Section, f64, f64) {
+fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, ShellSection, f64, f64) {
     let at = |x: f64, y: f64| DVec3::new(x, y, 0.0);
     let p = [
         at(0.0, 0.0),
@@ -51,7 +51,7 @@ fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, Section, f64, f64) {
         .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
         .collect();
     let mesh = TriMesh::new(&p, &t, 0).unwrap().0;
-    let section = Section {
+    let section = ShellSection {
         material: Material {
             youngs_modulus: 1e6,
             poissons_ratio: 0.25,
@@ -175,7 +175,7 @@ fn strain_on_the_faces_of_a_clamped_beam() {
     let mesh = bench::grid(40, 4, bench::Cut::Rising, |u, v| {
         DVec3::new(u * length, v * width, 0.0)
     });
-    let section = Section {
+    let section = ShellSection {
         material: Material {
             youngs_modulus: e,
             poissons_ratio: 0.0,

@@ -8,9 +8,10 @@ use hapdef::budget::{Budget, Cancelled, Progress, Quality, unwatched};
 use hapdef::dataset::SignalMatrix;
 use hapdef::design;
 use hapdef::placement::expected_error::{
-    Certificate, Detail, ExpectedError, Forces, Knowledge, ROUNDS, Scene, certify, local,
+    Certificate, Detail, ExpectedError, ROUNDS, SceneForces, SignalKnowledge, TouchScene, certify,
+    local,
 };
-use hapdef::placement::{Constraints, Pool, Request, Selector, SelectorKind, SensorSet};
+use hapdef::placement::{Constraints, Pool, SelectionRequest, Selector, SelectorKind, SensorSet};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -51,14 +52,14 @@ impl Patch {
         }
     }
 
-    fn known(&self) -> Knowledge<'_> {
-        Knowledge {
+    fn known(&self) -> SignalKnowledge<'_> {
+        SignalKnowledge {
             noise: 1.0,
             variance: None,
             shared: None,
             density: None,
             among: None,
-            forces: self.loose.then_some(Forces {
+            forces: self.loose.then_some(SceneForces {
                 touches: &self.forces,
                 coming: [3.0, 25.0],
                 possible: 40.0,
@@ -67,9 +68,9 @@ impl Patch {
         }
     }
 
-    fn scene(&self) -> Scene {
+    fn scene(&self) -> TouchScene {
         let known = self.known();
-        Scene::new(&self.x, &self.targets, &known, detail(), &unwatched).unwrap()
+        TouchScene::new(&self.x, &self.targets, &known, detail(), &unwatched).unwrap()
     }
 
     fn chosen(&self, constraints: &Constraints) -> SensorSet {
@@ -80,7 +81,7 @@ impl Patch {
             sites: &sites,
             positions: &[],
         };
-        let request = Request {
+        let request = SelectionRequest {
             constraints,
             watch: &unwatched,
             found: &|_| {},
@@ -104,14 +105,14 @@ fn detail() -> Detail {
     }
 }
 
-fn certified(scene: &Scene, required: &[usize], chosen: &[usize]) -> Certificate {
+fn certified(scene: &TouchScene, required: &[usize], chosen: &[usize]) -> Certificate {
     let all: Vec<usize> = (0..scene.sites()).collect();
     let certificate = certify(scene, &all, required, chosen, &unwatched);
     certificate.unwrap().unwrap()
 }
 
 /// All sets of three with the error (mm) of each where one place is meant.
-fn sets_of_three(scene: &Scene) -> Vec<([usize; 3], f64)> {
+fn sets_of_three(scene: &TouchScene) -> Vec<([usize; 3], f64)> {
     let mut sets = Vec::new();
     for a in 0..SITES {
         for b in a + 1..SITES {
@@ -213,11 +214,11 @@ fn a_bound_can_be_stopped_and_asks_for_touches_and_known_sites() {
     // Touches all at one place leave nothing to find out.
     let x = SignalMatrix::new(4, (0..48).map(|k| f64::from(k).sin()).collect());
     let known = patch.known();
-    let known = Knowledge {
+    let known = SignalKnowledge {
         forces: None,
         ..known
     };
-    let one = Scene::new(&x, &[[1.3; 3]; 4], &known, detail(), &unwatched).unwrap();
+    let one = TouchScene::new(&x, &[[1.3; 3]; 4], &known, detail(), &unwatched).unwrap();
     assert_eq!(certify(&one, &all, &[], &[0, 1], &unwatched), Ok(None));
 }
 

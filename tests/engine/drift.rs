@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use hapdef::elasticity::Touch;
 use hapdef::inference::Chain;
-use hapdef::live::{Pipeline, Sample, Update};
+use hapdef::live::{LiveUpdate, Pipeline, Sample};
 use hapdef::wire::{Hello, VERSION};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,7 +63,7 @@ pub fn run(
     world: World,
     presses: &[Press],
     seconds: f64,
-    mut tell: impl FnMut(f64, &Update, Option<&Press>),
+    mut tell: impl FnMut(f64, &LiveUpdate, Option<&Press>),
 ) {
     /// Seconds in which creep comes.
     const CREEPS_S: f64 = 6.0;

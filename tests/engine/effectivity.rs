@@ -7,12 +7,12 @@ use bench::hexes::{Bricks, ends};
 use bench::solids::clamp;
 use glam::DVec3;
 use hapdef::budget::{ElementBudget, Quality, unwatched};
-use hapdef::elasticity::estimate::{self, Sample};
+use hapdef::elasticity::estimate::{self, ModelSample};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::respond::{self, Quantity, gives_way, respond_from};
 use hapdef::elasticity::solid::ground::{SolidGraded, SolidGround};
 use hapdef::elasticity::{Material, Model, Support, Touch};
-use hapdef::mesh::walls::Side;
+use hapdef::mesh::walls::WallSide;
 
 const MATERIAL: Material = Material {
     youngs_modulus: 1.7e9,
@@ -202,7 +202,7 @@ fn estimates_of_solids_are_of_the_size_of_the_error() {
     for case in [cube(), channel(), tube(), bracket()] {
         let part = case.bricks.surface();
         let supports = std::slice::from_ref(&case.support);
-        let told = |_: DVec3| None::<Side>;
+        let told = |_: DVec3| None::<WallSide>;
         let ground = SolidGround::new(&part, MATERIAL, supports, &told, &unwatched).unwrap();
         for quality in [Quality::Draft, Quality::Standard] {
             let aim = quality.budget().elements;
@@ -291,7 +291,7 @@ fn the_slotted_tube_is_as_far_off_as_it_says() {
 fn own(case: &Case, side_mm: f64) -> SolidGround {
     let part = case.bricks.filled(DVec3::splat(side_mm * 1e-3));
     let supports = std::slice::from_ref(&case.support);
-    let told = |_: DVec3| None::<Side>;
+    let told = |_: DVec3| None::<WallSide>;
     SolidGround::new(&part, MATERIAL, supports, &told, &unwatched).unwrap()
 }
 
@@ -304,8 +304,8 @@ fn asking(percent: f64) -> ElementBudget {
     }
 }
 
-fn read(graded: &SolidGraded, case: &Case) -> Sample {
-    Sample::read(&graded.model, &case.touches, &case.places, &unwatched).unwrap()
+fn read(graded: &SolidGraded, case: &Case) -> ModelSample {
+    ModelSample::read(&graded.model, &case.touches, &case.places, &unwatched).unwrap()
 }
 
 #[test]
@@ -392,10 +392,10 @@ fn carries_on(case: &Case, graded: &SolidGraded, error: f64) {
     let (at, _) = model.index().nearest(model.mesh().positions()[vertex]);
     let observer = model.observer(&[at], Face::Inside);
     for side in [
-        respond::Side::Loads,
-        respond::Side::Outputs,
-        respond::Side::LoadsAbove,
-        respond::Side::OutputsAbove,
+        respond::SolvedSide::Loads,
+        respond::SolvedSide::Outputs,
+        respond::SolvedSide::LoadsAbove,
+        respond::SolvedSide::OutputsAbove,
     ] {
         let read = respond_from(
             side,

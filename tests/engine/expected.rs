@@ -11,11 +11,11 @@ use hapdef::dataset::SignalMatrix;
 use hapdef::gaussian_process::{Covariance, Distances, GpKernel};
 use hapdef::placement::constraints::{Loss, LostBy, Thorough};
 use hapdef::placement::entropy::Entropy;
-use hapdef::placement::expected_error::{Detail, ExpectedError, Knowledge, ROUNDS};
+use hapdef::placement::expected_error::{Detail, ExpectedError, ROUNDS, SignalKnowledge};
 use hapdef::placement::greedy_svr::{GreedySvr, TOLERANCE};
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
-use hapdef::placement::{Constraints, PlacementError, Pool, Request, Selection, Selector};
+use hapdef::placement::{Constraints, PlacementError, Pool, Selection, SelectionRequest, Selector};
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Grouping, Hyper};
 
@@ -117,7 +117,7 @@ impl Square {
             sites: &self.sites,
             positions: &self.positions,
         };
-        let request = Request {
+        let request = SelectionRequest {
             constraints,
             watch: &unwatched,
             found: &|_| (),
@@ -133,7 +133,7 @@ impl Square {
 
 fn expected_error(rounds: usize) -> ExpectedError<'static> {
     ExpectedError {
-        known: Knowledge {
+        known: SignalKnowledge {
             noise: 1.0,
             variance: None,
             shared: None,
@@ -224,7 +224,7 @@ fn a_choice_with_losses_can_be_stopped() {
             ControlFlow::Continue(())
         }
     };
-    let request = Request {
+    let request = SelectionRequest {
         constraints: &failing(0.3, 1, LostBy::Worst),
         watch: &watch,
         found: &|_| (),

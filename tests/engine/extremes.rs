@@ -19,7 +19,7 @@ use hapdef::io::artifacts::{self, Provenance};
 use hapdef::io::report;
 use hapdef::mesh::TriMesh;
 use hapdef::placement::SelectorKind;
-use hapdef::project::{ElementKind, Lattice, Masks, Project, SupportKeys, SupportKind};
+use hapdef::project::{ElementKind, Masks, Project, SiteLattice, SupportKeys, SupportKind};
 
 fn budget() -> Budget {
     Budget {
@@ -113,7 +113,7 @@ fn the_ends_of_the_project_are_sound() {
             p.feasible.edge_neighbours = 1000;
             p.feasible.edge_radius_mm = 1e3;
         }),
-        ("even lattice", |p| p.sites.lattice = Lattice::Even),
+        ("even lattice", |p| p.sites.lattice = SiteLattice::Even),
         ("C and ε at their ends", |p| {
             p.selection.c_mm = 1e9;
             p.selection.epsilon_mm = 0.0;
@@ -376,7 +376,7 @@ fn plate(thickness: f64, nu: f64, sliver: f64) -> (Inputs, f64) {
     (inputs, bending + shear)
 }
 
-fn pressed(inputs: &Inputs) -> Result<given::Answer, DesignError> {
+fn pressed(inputs: &Inputs) -> Result<given::GivenAnswer, DesignError> {
     let touch = Touch {
         position: DVec3::ZERO,
         normal: DVec3::Z,
@@ -509,7 +509,7 @@ fn touches_off_the_part_are_projected_or_refused() {
     assert!((answer.rows.touch_distances[0] - 3e-3).abs() < 1e-9);
     assert!((answer.rows.site_distances[0] - 0.5e-3).abs() < 1e-9);
     let straight = at(0.0, 0.0).unwrap();
-    let strain = |a: &given::Answer| a.pairs().next().unwrap().strain;
+    let strain = |a: &given::GivenAnswer| a.pairs().next().unwrap().strain;
     assert!((strain(&answer) / strain(&straight) - 1.0).abs() < 1e-9);
     // Pressed on what is held: nothing moves, and that is no error.
     let held = at(0.0, 0.047).unwrap();

@@ -3,19 +3,22 @@
 use std::sync::{Arc, LazyLock};
 
 use crate::gauges;
-use hapdef::board::{ChannelFault, Faults, Illness, Press, RAMP_S, Script, SimulatedBoard, Truth};
+use hapdef::board::{
+    ChannelFault, Faults, Illness, PressScript, RAMP_S, ScriptedPress, SimulatedBoard, Truth,
+};
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::inference::calibration::noise_of_mean;
 use hapdef::inference::{
-    AsGlued, Errors, Features, KnownPress, Lessons, Matching, Trained, calibrate, cramer_rao,
+    AsGlued, Features, KnownPress, LiveLessons, Matching, ReadingErrors, TrainedLive, calibrate,
+    cramer_rao,
 };
-use hapdef::live::{Health, Input, Pipeline, Receiver, Update};
+use hapdef::live::{Health, Input, LiveUpdate, Pipeline, Receiver};
 use hapdef::regression::Hyper;
-use hapdef::uncertainty::{Pressing, Uncertainty};
-use hapdef::wire::{Message, encode};
+use hapdef::uncertainty::{HandPressing, Uncertainty};
+use hapdef::wire::{WireMessage, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -66,7 +69,7 @@ fn matching_is_as_good_as_can_be() {
     let gauges = sensing.gauges.len();
     let mut matching = Matching::new(
         Arc::clone(&sensing.drawn.map),
-        Errors::of_noise(NOISE, gauges),
+        ReadingErrors::of_noise(NOISE, gauges),
         60.0,
     );
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -117,7 +120,7 @@ fn the_trained_ones_learn() {
     let lab = lab();
     let lesson = lab.sensing.lessons(&lab.inputs, 1000, 0).unwrap();
     let used = vec![true; lab.sensing.gauges.len()];
-    let lessons = Lessons {
+    let lessons = LiveLessons {
         x: &lesson.x,
         places_mm: &lesson.places_mm,
         forces: &lesson.forces,
@@ -128,7 +131,7 @@ fn the_trained_ones_learn() {
     };
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut error = |features| {
-        let trained = Trained::train(features, &lessons, &Hyper::default());
+        let trained = TrainedLive::train(features, &lessons, &Hyper::default());
         let touches = touches(100, 6, 15.0);
         let off = |t: &Touch| {
             let (place, force) = trained.find(&noisy(&lab.sensing.sensitivity.read(t), &mut rng));
@@ -175,7 +178,7 @@ fn known_touches_show_how_gauges_are_glued() {
         .collect();
     // Pressed by a machine, on the very model.
     let off = Uncertainty {
-        pressing: Pressing::EXACT,
+        pressing: HandPressing::EXACT,
         elements: 0.01,
         ..lab.sensing.off
     };
@@ -206,7 +209,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(script: Script, faults: Faults, drift: f64) -> Self {
+    pub fn new(script: PressScript, faults: Faults, drift: f64) -> Self {
         let lab = lab();
         let gauges = lab.sensing.gauges.len();
         let mut options = board::options(&lab.inputs, gauges);
@@ -234,10 +237,10 @@ impl Bench {
     }
 
     /// Runs so many milliseconds and tells of every sample, with what really happened.
-    pub fn run(&mut self, milliseconds: u64, mut tell: impl FnMut(&Pipeline, Update, Truth)) {
+    pub fn run(&mut self, milliseconds: u64, mut tell: impl FnMut(&Pipeline, LiveUpdate, Truth)) {
         let mut to_board = Vec::new();
-        encode(&Message::AskHello, 0, 0, 12, &mut to_board);
-        encode(&Message::Start, 1, 0, 12, &mut to_board);
+        encode(&WireMessage::AskHello, 0, 0, 12, &mut to_board);
+        encode(&WireMessage::Start, 1, 0, 12, &mut to_board);
         for _ in 0..milliseconds {
             let (mut bytes, mut truths) = (Vec::new(), Vec::new());
             self.board
@@ -265,8 +268,8 @@ impl Bench {
     }
 }
 
-pub fn press(number: usize, force: f64, start_s: f64, duration_s: f64) -> Press {
-    Press {
+pub fn press(number: usize, force: f64, start_s: f64, duration_s: f64) -> ScriptedPress {
+    ScriptedPress {
         start_s,
         duration_s,
         touch: touches(40, 11, force)[number],
@@ -278,7 +281,7 @@ pub fn press(number: usize, force: f64, start_s: f64, duration_s: f64) -> Press 
 #[test]
 fn nothing_is_felt_where_nothing_touches() {
     // Ten times the usual drift, for two minutes.
-    let mut bench = Bench::new(Script::Given(Vec::new()), Faults::default(), 1e-6);
+    let mut bench = Bench::new(PressScript::Given(Vec::new()), Faults::default(), 1e-6);
     let (mut felt, mut samples) = (0, 0);
     bench.run(120_000, |pipeline, update, _| {
         samples += 1;
@@ -294,7 +297,7 @@ fn nothing_is_felt_where_nothing_touches() {
 
 #[test]
 fn a_failed_gauge_is_found_and_done_without() {
-    let presses: Vec<Press> = (0..20)
+    let presses: Vec<ScriptedPress> = (0..20)
         .map(|k| press(k, 9.0, 2.0 + f64::from(k as u32), 0.7))
         .collect();
     for (illness, named) in [
@@ -310,7 +313,7 @@ fn a_failed_gauge_is_found_and_done_without() {
             from_s: 6.0,
             until_s: f64::INFINITY,
         });
-        let mut bench = Bench::new(Script::Given(presses.clone()), faults, 0.0);
+        let mut bench = Bench::new(PressScript::Given(presses.clone()), faults, 0.0);
         let (mut found_at, mut errors) = (None, Vec::new());
         bench.run(22_000, |pipeline, update, truth| {
             for (k, health) in pipeline.health().iter().enumerate() {
@@ -358,7 +361,7 @@ fn the_same_on_any_number_of_threads() {
                 design::sensing(&lab.inputs, &Quality::Draft.budget(), &unwatched).unwrap();
             let mut matching = Matching::new(
                 Arc::clone(&sensing.drawn.map),
-                Errors::of_noise(NOISE, 10),
+                ReadingErrors::of_noise(NOISE, 10),
                 60.0,
             );
             touches(20, 4, 6.0)

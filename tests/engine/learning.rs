@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use hapdef::budget::unwatched;
 use hapdef::dataset::SignalMatrix;
 use hapdef::io::npz::NpzFile;
-use hapdef::learning::{Family, Lessons, Method, Trained, TrainingRequest, train};
+use hapdef::learning::{Family, MeasuredTouches, Method, TrainedEstimator, TrainingRequest, train};
 use hapdef::regression::Grouping;
 use serde_json::Value;
 
@@ -52,9 +52,9 @@ fn skin(channels: usize, touches: usize) -> Skin {
 }
 
 impl Skin {
-    fn train(&self, asked: &TrainingRequest) -> Trained {
+    fn train(&self, asked: &TrainingRequest) -> TrainedEstimator {
         let groups = Grouping::Place.of(&self.places_mm);
-        let lessons = Lessons {
+        let lessons = MeasuredTouches {
             x: &self.x,
             places_mm: &self.places_mm,
             forces: &self.forces,

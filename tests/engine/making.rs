@@ -9,7 +9,7 @@ use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::dataset::{self, Signal};
 use hapdef::design::{self, Inputs, Sensing, Simulated};
 use hapdef::elasticity::{Push, Touch};
-use hapdef::inference::{Errors, Matching};
+use hapdef::inference::{Matching, ReadingErrors};
 use hapdef::placement::SelectorKind;
 use hapdef::project::ChosenSite;
 use hapdef::uncertainty::{Gluing, Making, Uncertainty};
@@ -186,7 +186,7 @@ fn whoever_knows_of_friction_finds_touches_better() {
     let pushes: Vec<Push> = touches.iter().map(&mut drag).collect();
     let error = |off: Uncertainty| {
         let deviations = sensing.drawn.deviations(&off);
-        let errors = Errors::known(&off, GAUGES, Some(deviations));
+        let errors = ReadingErrors::known(&off, GAUGES, Some(deviations));
         let mut matching = Matching::new(Arc::clone(&sensing.drawn.map), errors, 60.0);
         let pairs = touches.iter().zip(&pushes);
         let away = pairs.map(|(touch, push)| {
@@ -208,7 +208,7 @@ fn whoever_knows_of_friction_finds_touches_better() {
 /// What is found of touches that are pushed aside by so much of their force, each in a direction of its own: the mean
 /// error of place (mm) and of the force along the surface (N), and how many lie in the region of 90 %.
 fn found_of(sensing: &Sensing, touches: &[Touch], aside: f64, off: &Uncertainty) -> [f64; 3] {
-    let errors = Errors::known(
+    let errors = ReadingErrors::known(
         off,
         sensing.gauges.len(),
         Some(sensing.drawn.deviations(off)),

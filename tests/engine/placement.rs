@@ -9,7 +9,7 @@ use hapdef::placement::greedy_svr::{Audit, GreedySvr, TOLERANCE};
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
 use hapdef::placement::pca_qr::PcaQr;
-use hapdef::placement::{Constraints, PlacementError, Pool, Request, Selection, Selector};
+use hapdef::placement::{Constraints, PlacementError, Pool, Selection, SelectionRequest, Selector};
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Grouping, Hyper};
 
@@ -119,7 +119,7 @@ fn choose(
 ) -> Result<Selection, PlacementError> {
     selector.select(
         &strip.pool(),
-        &Request {
+        &SelectionRequest {
             constraints,
             watch: &unwatched,
             found: &|_| (),
@@ -190,7 +190,7 @@ fn each_step_is_told_as_soon_as_it_is_made() {
     let selection = svr(TUNED)
         .select(
             &strip.pool(),
-            &Request {
+            &SelectionRequest {
                 constraints: &Constraints::count(3),
                 watch: &unwatched,
                 found: &|set| told.lock().unwrap().push(set.sites.clone()),

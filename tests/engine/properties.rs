@@ -11,7 +11,7 @@ use hapdef::dataset::{self, Signal, SignalMatrix};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::Face;
-use hapdef::elasticity::respond::{Quantity, Responses, Side, respond, respond_from};
+use hapdef::elasticity::respond::{Quantity, Responses, SolvedSide, respond, respond_from};
 use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::{DofSet, Model as _, ShellModel, Touch};
 use hapdef::gauge::Gauge;
@@ -194,18 +194,18 @@ fn blocks_give_the_bytes_of_single_touches() {
     let m = model(&inputs);
     let touches = many_touches(&inputs);
     let observer = m.observer(&some_sites(&inputs), Face::Inside);
-    let read = |side: Side, touches: &[Touch]| {
+    let read = |side: SolvedSide, touches: &[Touch]| {
         let reading = Quantity::StrainAndDisplacement;
         let r = respond_from(side, &m, touches, &observer, reading, &unwatched).unwrap();
         table(&r, touches.len())
     };
     for (side, t) in [
-        (Side::Loads, 2),
-        (Side::Loads, 69),
-        (Side::LoadsAbove, 2),
-        (Side::LoadsAbove, 69),
-        (Side::OutputsAbove, 2),
-        (Side::OutputsAbove, 69),
+        (SolvedSide::Loads, 2),
+        (SolvedSide::Loads, 69),
+        (SolvedSide::LoadsAbove, 2),
+        (SolvedSide::LoadsAbove, 69),
+        (SolvedSide::OutputsAbove, 2),
+        (SolvedSide::OutputsAbove, 69),
     ] {
         let all = read(side, &touches);
         let single = read(side, &touches[t..=t]);
@@ -238,10 +238,10 @@ fn loads_and_outputs_are_reciprocal() {
         // More touches than outputs, and fewer.
         for touches in [&touches[..], &touches[..20]] {
             let ways = [
-                Side::Loads,
-                Side::Outputs,
-                Side::LoadsAbove,
-                Side::OutputsAbove,
+                SolvedSide::Loads,
+                SolvedSide::Outputs,
+                SolvedSide::LoadsAbove,
+                SolvedSide::OutputsAbove,
             ];
             let [a, b, c, d] = ways.map(|side| {
                 let r = respond_from(side, &m, touches, &observer, reading, &unwatched).unwrap();
@@ -265,8 +265,11 @@ fn loads_and_outputs_are_reciprocal() {
         let reading = Quantity::Gauge(&angles);
         respond(&m, &touches[..count], &observer, reading, &unwatched).unwrap()
     };
-    assert_eq!((fewer(70).side, fewer(70).solves), (Side::Outputs, 12));
-    assert_eq!((fewer(5).side, fewer(5).solves), (Side::Loads, 5));
+    assert_eq!(
+        (fewer(70).side, fewer(70).solves),
+        (SolvedSide::Outputs, 12)
+    );
+    assert_eq!((fewer(5).side, fewer(5).solves), (SolvedSide::Loads, 5));
 }
 
 /// Blocks are used again and again, with only what was filled taken out of them.
@@ -282,10 +285,10 @@ fn what_a_block_held_before_leaves_no_trace() {
     let one = m.solve(&m.forces(&touches[333]));
     let direct = observer.strain_of(&m, &one);
     for side in [
-        Side::Loads,
-        Side::Outputs,
-        Side::LoadsAbove,
-        Side::OutputsAbove,
+        SolvedSide::Loads,
+        SolvedSide::Outputs,
+        SolvedSide::LoadsAbove,
+        SolvedSide::OutputsAbove,
     ] {
         let read = respond_from(side, &m, &touches, &observer, Quantity::Strain, &unwatched);
         let read = table(&read.unwrap(), touches.len());

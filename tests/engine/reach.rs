@@ -10,11 +10,11 @@ use hapdef::cli;
 use hapdef::design;
 use hapdef::elasticity::Material;
 use hapdef::elasticity::solid::ground::SolidGround;
-use hapdef::feasible::Surroundings;
+use hapdef::feasible::SiteSurroundings;
 use hapdef::mesh::mount::Mount;
 use hapdef::mesh::reach::{FINGERTIP, Finger};
 use hapdef::mesh::room::Room;
-use hapdef::mesh::walls::Side;
+use hapdef::mesh::walls::WallSide;
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 /// Side of a voxel (m).
@@ -119,13 +119,13 @@ fn a_pad_gets_round_corners_and_not_into_what_is_closed() {
 
 #[test]
 fn what_is_closed_is_open_for_those_who_glue() {
-    let closed = Surroundings {
+    let closed = SiteSurroundings {
         behind: vec![true; 2],
         room: vec![0.0; 2],
     };
     assert!(closed.are_closed());
     assert_eq!(closed.opened().room, [f64::INFINITY; 2]);
-    let open = Surroundings {
+    let open = SiteSurroundings {
         behind: vec![true; 2],
         room: vec![0.0, 3e-3],
     };
@@ -185,7 +185,7 @@ fn touches_come_to_the_outside_and_gauges_to_the_back_of_it() {
         // The rod is still there to be seen, and counted.
         let rod = share(&ground.whole, |_| true, |p, _| beside(p) < 6.5 && p.z > 7.0);
         assert!(rod > 0.05);
-        let framed = ground.walls.sides.iter().filter(|&&s| s == Side::Frame);
+        let framed = ground.walls.sides.iter().filter(|&&s| s == WallSide::Frame);
         assert!(framed.count() > 100);
         let words = ground.reach.words(FINGERTIP).join(" ");
         assert!(words.contains("touch.reach_mm"), "{words}");
@@ -196,7 +196,7 @@ fn touches_come_to_the_outside_and_gauges_to_the_back_of_it() {
 fn what_the_user_says_of_a_face_holds() {
     let part = framed_tube(false);
     let rod = |p: DVec3| (p.x - 0.02).abs().max((p.y - 0.02).abs()) < 6.5e-3 && p.z > 7e-3;
-    let told = |p: DVec3| rod(p).then_some(Side::Inside);
+    let told = |p: DVec3| rod(p).then_some(WallSide::Inside);
     let ground = SolidGround::new(&part, NYLON, &[], &told, &unwatched).unwrap();
     let backs = behind(&ground);
     let on_rod = share(&ground.inside, |t| backs[t as usize], |p, _| rod(p * 1e-3));

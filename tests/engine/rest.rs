@@ -1,7 +1,7 @@
 //! The rest that readings are held against: taken under a touch it is none, and that shows.
 
-use hapdef::board::{Drawn, Faults, Script};
-use hapdef::live::News;
+use hapdef::board::{Faults, PressScript, RandomPresses};
+use hapdef::live::RestNews;
 use hapdef::uncertainty::Making;
 
 use crate::inference::{Bench, press};
@@ -17,10 +17,10 @@ fn a_rest_that_was_taken_under_a_press_is_taken_again() {
             press(k, 8.0, begins, 1.5 - begins),
             press(k + PRESSES, 8.0, 3.0, 1.0),
         ];
-        let mut bench = Bench::new(Script::Given(presses), Faults::default(), 0.1e-6);
+        let mut bench = Bench::new(PressScript::Given(presses), Faults::default(), 0.1e-6);
         let mut off = Vec::new();
         bench.run(4_500, |pipeline, update, truth| {
-            told += usize::from(pipeline.news() == Some(News::Released));
+            told += usize::from(pipeline.news() == Some(RestNews::Released));
             match (truth.touch, update.contact) {
                 (None, Some(_)) if truth.time_us > 1_800_000 => ghosts += 1,
                 (Some(touch), Some(contact)) if truth.time_us > 3_200_000 => {
@@ -52,9 +52,9 @@ fn a_simulated_board_is_left_alone_at_first() {
         tip_radius: 5e-3,
     };
     for seed in 0..20_u32 {
-        let mut script = Script::random(
+        let mut script = PressScript::random(
             vec![place; 3],
-            Drawn::usual([2.0, 15.0], Making::EXACT),
+            RandomPresses::usual([2.0, 15.0], Making::EXACT),
             u64::from(seed),
         );
         // Nobody has listened so far.

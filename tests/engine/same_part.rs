@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use glam::DVec3;
-use hapdef::budget::{Budget, Limits, Quality, unwatched};
+use hapdef::budget::{Budget, BudgetLimits, Quality, unwatched};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::grade::ShellGround;
 use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::elasticity::support::HeldRegion;
-use hapdef::elasticity::{DofSet, ElasticError, Material, Section, Support, Touch};
+use hapdef::elasticity::{DofSet, ElasticError, Material, ShellSection, Support, Touch};
 use hapdef::given::{self, GivenSite};
 use hapdef::io::mesh_file::read_mesh;
 use hapdef::limb::{BoxMm, LimbSpec, LimbSupport};
@@ -20,7 +20,7 @@ use hapdef::mesh::repair::Repair;
 use hapdef::mesh::unroll::Axis;
 use hapdef::project::{Masks, Project, SupportKeys, SupportKind, Unit};
 
-const SECTION: Section = Section {
+const SECTION: ShellSection = ShellSection {
     material: Material {
         youngs_modulus: 1.7e9,
         poissons_ratio: 0.35,
@@ -174,9 +174,9 @@ fn computed(written: Written) -> Computed {
             direction: DVec3::Z,
         })
         .collect();
-    let limits = Limits {
+    let limits = BudgetLimits {
         vertices: Some(1200),
-        ..Limits::default()
+        ..BudgetLimits::default()
     };
     let budget: Budget = Quality::Draft.budget().within(&limits);
     let answer = given::answer(&inputs(written), &touches, &sites, &budget, &unwatched).unwrap();

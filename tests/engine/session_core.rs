@@ -9,7 +9,7 @@ use hapdef::budget::Quality;
 use hapdef::document::Document;
 use hapdef::io::opening::bundled;
 use hapdef::io::project_file::LoadedProject;
-use hapdef::session::{Attention, Event, Mishap, Opened, Session, Task, Wake};
+use hapdef::session::{Attention, Happening, Mishap, Opened, Session, Task, Wake};
 
 /// A session on a limb so coarse that a simulation ends soon.
 fn limb() -> LoadedProject {
@@ -148,7 +148,7 @@ fn another_project_takes_the_place_of_all_that_was_known() {
     // So does what was told of it, but not what went wrong.
     assert!(!said(&s, "The report is in"));
     assert!(said(&s, "was changed while the file was read"));
-    let opened = |e: &Event| matches!(e, Event::Opened { .. });
+    let opened = |e: &Happening| matches!(e, Happening::Opened { .. });
     assert!(s.news.take_events().iter().any(opened));
 }
 
@@ -162,7 +162,7 @@ fn what_is_saved_opens_as_it_was() {
     assert!(s.document.is_dirty());
     until_idle(&mut s);
     assert!(!s.document.is_dirty(), "{:?}", s.news.messages);
-    assert_eq!(s.news.take_events(), [Event::Saved(path.clone())]);
+    assert_eq!(s.news.take_events(), [Happening::Saved(path.clone())]);
 
     let mut again = session();
     again.open_path(&path, None);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use hapdef::elasticity::Touch;
-use hapdef::inference::{Errors, Kind, Matching, Several, Touches};
+use hapdef::inference::{Matching, ReadingErrors, Several, SeveralTouches, TouchKind};
 use hapdef::mesh::sample::even;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -18,9 +18,9 @@ const OFF: f64 = 0.02;
 
 fn estimator() -> (Matching, Several) {
     let sensing = &lab().sensing;
-    let errors = Errors {
+    let errors = ReadingErrors {
         relative: OFF,
-        ..Errors::of_noise(NOISE, sensing.gauges.len())
+        ..ReadingErrors::of_noise(NOISE, sensing.gauges.len())
     };
     let matching = Matching::new(Arc::clone(&sensing.drawn.map), errors, 60.0);
     let several = Several::new(&matching);
@@ -43,7 +43,7 @@ fn read(touches: &[Touch], rng: &mut ChaCha8Rng) -> Vec<f64> {
     sum
 }
 
-fn count(matching: &mut Matching, several: &Several, reading: &[f64]) -> Touches {
+fn count(matching: &mut Matching, several: &Several, reading: &[f64]) -> SeveralTouches {
     let one = matching.find(reading);
     matching.count(several, reading, &one)
 }
@@ -71,7 +71,7 @@ fn sets(of: usize, many: usize, apart: f64, forces: [f64; 2], seed: u64) -> Vec<
 }
 
 /// Mean distance (mm) and difference of force (N) of touches that were found, each to another of those that are.
-fn off(found: &Touches, real: &[Touch]) -> (f64, f64) {
+fn off(found: &SeveralTouches, real: &[Touch]) -> (f64, f64) {
     let away = |p: DVec3, t: &Touch| p.distance(t.position) * 1e3;
     let orders: Vec<Vec<usize>> = match real.len() {
         2 => vec![vec![0, 1], vec![1, 0]],
@@ -96,7 +96,7 @@ fn two_fingers_are_two_touches() {
     let sets = sets(2, 200, 25e-3, [5.0, 30.0], 7);
     for set in &sets {
         let found = count(&mut matching, &several, &read(set, &mut rng));
-        if found.kind == Kind::Points && found.contacts.len() == 2 {
+        if found.kind == TouchKind::Points && found.contacts.len() == 2 {
             let (mm, n) = off(&found, set);
             right += 1;
             far += mm;
@@ -128,7 +128,7 @@ fn one_finger_is_one_touch() {
     let sets = sets(1, 1000, 0.0, [1.0, 30.0], 8);
     for set in &sets {
         let found = count(&mut matching, &several, &read(set, &mut rng));
-        if found.count() != Some(1) || found.kind != Kind::Points {
+        if found.count() != Some(1) || found.kind != TouchKind::Points {
             println!(
                 "{:?} {:?} {} at {} N",
                 found.kind,
@@ -197,7 +197,7 @@ fn a_palm_is_an_area() {
         for touch in &places {
             let reading = read_palm(touch.position, radius, 25.0, &mut rng);
             let found = count(&mut matching, &several, &reading);
-            if let (Kind::Area(_), [contact]) = (found.kind, &found.contacts[..]) {
+            if let (TouchKind::Area(_), [contact]) = (found.kind, &found.contacts[..]) {
                 seen += 1;
                 far += contact.position.distance(touch.position) * 1e3;
                 off += (contact.force - 25.0).abs();
@@ -209,7 +209,7 @@ fn a_palm_is_an_area() {
                     found.probability
                 );
             }
-            points += usize::from(found.count() == Some(1) && found.kind == Kind::Points);
+            points += usize::from(found.count() == Some(1) && found.kind == TouchKind::Points);
         }
         let count = f64::from(seen);
         println!(
@@ -239,7 +239,10 @@ fn fingers_come_and_go() {
         };
         let presses = [press(set[0], 3.0, 6.0), press(set[1], 5.0, 2.0)];
         run(CALM, &presses, 11.0, |now, update, _| {
-            let count = update.touches.as_ref().map_or(Some(0), Touches::count);
+            let count = update
+                .touches
+                .as_ref()
+                .map_or(Some(0), SeveralTouches::count);
             let expected = match now {
                 t if (3.4..5.0).contains(&t) || (7.4..8.9).contains(&t) => 1,
                 t if (5.4..6.9).contains(&t) => 2,

@@ -11,7 +11,7 @@ use hapdef::budget::{Quality, unwatched};
 use hapdef::design::{Inputs, large_motion};
 use hapdef::elasticity::Touch;
 use hapdef::elasticity::estimate::Discretization;
-use hapdef::given::{self, Answer, GivenSite};
+use hapdef::given::{self, GivenAnswer, GivenSite};
 use hapdef::io::mesh_file::parse_mesh;
 use hapdef::io::npz::Arrays;
 use hapdef::io::project_file;
@@ -217,12 +217,12 @@ fn strip() -> Inputs {
     }
 }
 
-fn answer(normal: DVec3, tip_radius: f64) -> Answer {
+fn answer(normal: DVec3, tip_radius: f64) -> GivenAnswer {
     pressed_at(0.08, normal, tip_radius)
 }
 
 /// The strip's answer to a press so far along it (m).
-fn pressed_at(along: f64, normal: DVec3, tip_radius: f64) -> Answer {
+fn pressed_at(along: f64, normal: DVec3, tip_radius: f64) -> GivenAnswer {
     let touch = Touch {
         position: DVec3::new(along, 0.01, 0.0),
         normal,
@@ -238,7 +238,7 @@ fn pressed_at(along: f64, normal: DVec3, tip_radius: f64) -> Answer {
     given::answer(&strip(), &[touch], &sites, &budget, &unwatched).unwrap()
 }
 
-fn says(answer: &Answer, words: &str) -> bool {
+fn says(answer: &GivenAnswer, words: &str) -> bool {
     answer.notes.iter().any(|note| note.contains(words))
 }
 

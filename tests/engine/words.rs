@@ -211,7 +211,7 @@ fn a_plate_of_two_triangles_is_touched_all_over_but_its_margin() {
 #[test]
 fn sites_wider_apart_than_the_part_are_told_so() {
     let mut inputs = limb();
-    inputs.project.sites.lattice = hapdef::project::Lattice::Even;
+    inputs.project.sites.lattice = hapdef::project::SiteLattice::Even;
     inputs.project.sites.spacing_mm = 5000.0;
     let error = design::simulate(&inputs, &budget(), &unwatched).err();
     let said = error.unwrap().to_string();

@@ -1,7 +1,7 @@
 //! What must hold of whatever a reader says: numbers that are finite, or words that fit on a screen.
 
 use hapdef::io::mesh_file::LoadedMesh;
-use hapdef::live::{Input, Update};
+use hapdef::live::{Input, LiveUpdate};
 use hapdef::study::Data;
 
 /// A screen, as terminals open.
@@ -184,7 +184,7 @@ pub fn input(input: &Input) -> Result<(), String> {
 ///
 /// # Errors
 /// What is not.
-pub fn update(update: &Update) -> Result<(), String> {
+pub fn update(update: &LiveUpdate) -> Result<(), String> {
     finite(update.strain.iter().flatten().copied())?;
     if let Some(c) = &update.contact {
         let place = c.position.to_array().into_iter().chain(c.normal.to_array());

@@ -347,11 +347,11 @@ fn trained(path: &Path) -> Outcome {
 
 fn trade(bytes: &[u8]) -> Result<Outcome, String> {
     let text = String::from_utf8_lossy(bytes);
-    let record = match trade_file::Record::parse(&text) {
+    let record = match trade_file::TradeRecord::parse(&text) {
         Ok(record) => record,
         Err(said) => return Ok(refused_of("trade.json", &said)),
     };
-    match trade_file::Record::parse(&record.to_json()) {
+    match trade_file::TradeRecord::parse(&record.to_json()) {
         Ok(again) if again == record => Ok(Outcome::Taken),
         Ok(_) => Err("what is written reads back as something else".into()),
         Err(said) => Err(format!("what is written is not read: {said}")),

@@ -9,13 +9,13 @@ use std::path::Path;
 use hapdef::budget::unwatched;
 use hapdef::cli::examples::Example;
 use hapdef::dataset::SignalMatrix;
-use hapdef::design::Outcome;
+use hapdef::design::TrainingOutcome;
 use hapdef::io::glb::write_glb;
-use hapdef::io::touch_file::{self, Origin};
-use hapdef::io::trade_file::Record;
-use hapdef::learning::{Family, Lessons, TrainingRequest, train};
+use hapdef::io::touch_file::{self, TrainingOrigin};
+use hapdef::io::trade_file::TradeRecord;
+use hapdef::learning::{Family, MeasuredTouches, TrainingRequest, train};
 use hapdef::mesh::TriMesh;
-use hapdef::wire::{Hello, Message, encode};
+use hapdef::wire::{Hello, WireMessage, encode};
 
 use super::reader::{NUMPY, PLACES, Reader, TABLE, packed, small};
 
@@ -425,7 +425,7 @@ fn npz() -> Vec<u8> {
 }
 
 fn trade() -> Vec<u8> {
-    let mut record = Record::parse(MEASURED).expect("the bundled trade");
+    let mut record = TradeRecord::parse(MEASURED).expect("the bundled trade");
     record.points.truncate(POINTS);
     record.to_json().into_bytes()
 }
@@ -438,7 +438,7 @@ pub fn trained(family: Family) -> Vec<u8> {
     let x = SignalMatrix::new(TOUCHES, (0..3 * TOUCHES).map(value).collect());
     let places: Vec<[f64; 3]> = (0..TOUCHES).map(|t| [at(t), 0.0, 1.0]).collect();
     let forces: Vec<f64> = (0..TOUCHES).map(|t| 1.0 + at(t)).collect();
-    let lessons = Lessons {
+    let lessons = MeasuredTouches {
         x: &x,
         places_mm: &places,
         forces: &forces,
@@ -448,10 +448,10 @@ pub fn trained(family: Family) -> Vec<u8> {
         family: Some(family),
         ..TrainingRequest::default()
     };
-    let learned: Outcome = train(&lessons, &asked, &unwatched)
+    let learned: TrainingOutcome = train(&lessons, &asked, &unwatched)
         .expect("enough to learn from")
         .into();
-    let origin = Origin {
+    let origin = TrainingOrigin {
         data: "d.npz".into(),
         fingerprint: "0".into(),
         touches: TOUCHES,
@@ -486,24 +486,28 @@ fn frames(notes: bool) -> Vec<u8> {
         rate_hz: 100,
         name: "Simulated board".into(),
     };
-    let log = |text: &str| Message::Log {
+    let log = |text: &str| WireMessage::Log {
         level: 0,
         text: text.into(),
     };
-    let mut said = vec![Message::Hello(hello)];
+    let mut said = vec![WireMessage::Hello(hello)];
     if notes {
         said.extend(["hapdef tare", "hapdef dead 5", "hapdef truth 31.8 0 60 5"].map(log));
     }
     let pressed = |k: u32| if k > 100 { 40 } else { 0 };
     said.extend((0..SAMPLES).map(|k| {
         let count = |c: u32| 2000 + 10 * c + (k * 7 + c) % 3 + pressed(k) * (c + 1) / 3;
-        Message::Data((0..6).map(count).collect())
+        WireMessage::Data((0..6).map(count).collect())
     }));
-    said.push(Message::Status {
+    said.push(WireMessage::Status {
         overruns: 1,
         temperature_centi: Some(2150),
     });
-    said.extend([Message::Pong(9), Message::Rate(500), Message::AskHello]);
+    said.extend([
+        WireMessage::Pong(9),
+        WireMessage::Rate(500),
+        WireMessage::AskHello,
+    ]);
     said.push(log("touched"));
     let mut bytes = vec![0];
     for (k, message) in (0_u32..).zip(&said) {
@@ -553,7 +557,7 @@ fn recorded_lines() -> Vec<u8> {
             1 => "hapdef truth none".to_owned(),
             _ => format!("hapdef line {k},{},3.5,-4,5,6", k % 5),
         };
-        let message = Message::Log { level: 0, text };
+        let message = WireMessage::Log { level: 0, text };
         encode(&message, k as u16, STEP_US * k, 12, &mut bytes);
     }
     bytes

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use hapdef::wire::{Decoder, Event, Hello, Message, VERSION, encode};
+use hapdef::wire::{Decoded, Decoder, Hello, VERSION, WireMessage, encode};
 use serde_json::Value;
 
 /// A program that ends with the test.
@@ -106,9 +106,9 @@ fn a_simulated_board_speaks_the_protocol() {
         .unwrap();
     let mut decoder = Decoder::default();
     let mut bytes = Vec::new();
-    encode(&Message::AskHello, 0, 0, 12, &mut bytes);
-    encode(&Message::Ping(77), 1, 0, 12, &mut bytes);
-    encode(&Message::Start, 2, 0, 12, &mut bytes);
+    encode(&WireMessage::AskHello, 0, 0, 12, &mut bytes);
+    encode(&WireMessage::Ping(77), 1, 0, 12, &mut bytes);
+    encode(&WireMessage::Start, 2, 0, 12, &mut bytes);
     stream.write_all(&bytes).unwrap();
     let (mut hello, mut pong, mut times) = (None, None, Vec::new());
     let begun = Instant::now();
@@ -118,23 +118,23 @@ fn a_simulated_board_speaks_the_protocol() {
             continue;
         };
         decoder.push(&buffer[..count], |event| match event {
-            Event::Message {
-                message: Message::Hello(h),
+            Decoded::Message {
+                message: WireMessage::Hello(h),
                 ..
             } => hello = Some(h),
-            Event::Message {
-                message: Message::Pong(p),
+            Decoded::Message {
+                message: WireMessage::Pong(p),
                 ..
             } => pong = Some(p),
-            Event::Message {
-                message: Message::Data(counts),
+            Decoded::Message {
+                message: WireMessage::Data(counts),
                 time_us,
                 ..
             } => {
                 assert!(counts.len() == 12 && counts.iter().all(|c| *c < 4096));
                 times.push(time_us);
             }
-            Event::Message { .. } => {}
+            Decoded::Message { .. } => {}
             other => panic!("{other:?}"),
         });
     }
@@ -490,8 +490,8 @@ fn numbers_out_of_range_are_wrong_usage() {
     }
 }
 
-fn hello(version: u8) -> Message {
-    Message::Hello(Hello {
+fn hello(version: u8) -> WireMessage {
+    WireMessage::Hello(Hello {
         version,
         board: 7,
         channels: 16,
@@ -510,7 +510,7 @@ fn recording(samples: u16) -> Vec<u8> {
     encode(&hello(VERSION), 0, 0, 12, &mut bytes);
     for k in 1..=samples {
         let count = |c: u32| 2000 + (u32::from(k) * 7 + c * 3) % 5;
-        let counts = Message::Data((0..16).map(count).collect());
+        let counts = WireMessage::Data((0..16).map(count).collect());
         encode(&counts, k, 1000 * u32::from(k), 12, &mut bytes);
     }
     bytes

@@ -12,15 +12,15 @@ use std::time::Instant;
 use glam::DVec3;
 use hapdef::budget::unwatched;
 use hapdef::design;
-use hapdef::link::{Address, BAUD, Listener, Pace, SessionEvent, State};
-use hapdef::live::{Pipeline, Update};
+use hapdef::link::{Address, BAUD, ConnectionState, Listener, Pace, SessionEvent};
+use hapdef::live::{LiveUpdate, Pipeline};
 use hapdef::studio::Studio;
 
 use egui_kittest::kittest::Queryable as _;
 use window::Window;
 
 /// One look at a touch whose force stands still: what was said, and the truth.
-fn next_touch(w: &mut Window, after: Option<DVec3>) -> (Update, DVec3, f64) {
+fn next_touch(w: &mut Window, after: Option<DVec3>) -> (LiveUpdate, DVec3, f64) {
     let found = std::cell::RefCell::new(None);
     w.wait("a touch", 40, |s: &Studio| {
         let truth = s.session.live.truth();
@@ -31,7 +31,7 @@ fn next_touch(w: &mut Window, after: Option<DVec3>) -> (Update, DVec3, f64) {
             && force > 2.0
         {
             let mut seen = found.borrow_mut();
-            let seen: &mut Vec<(Update, DVec3, f64)> = seen.get_or_insert_with(Vec::new);
+            let seen: &mut Vec<(LiveUpdate, DVec3, f64)> = seen.get_or_insert_with(Vec::new);
             seen.push((update, place, force));
             // The same force a few looks in a row: neither rising nor falling.
             return seen.len() > 6
@@ -54,7 +54,7 @@ fn a_simulated_board_from_start_to_replay() {
     w.stage("Live");
     w.press("Start a simulated board");
     w.wait("the board", 120, |s| {
-        s.session.live.state() == Some(State::Live)
+        s.session.live.state() == Some(ConnectionState::Live)
     });
     w.wait("the tare", 20, |s| {
         s.session.live.update().is_some_and(|u| u.strain.is_some())
@@ -182,7 +182,7 @@ fn unplug(w: &mut Window) {
     pull(w, f64::INFINITY);
     // Where the terminal is given to another board of these tests meanwhile, that one is found, and tried.
     w.wait("the unplug", 30, |s| {
-        s.session.live.state() != Some(State::Live)
+        s.session.live.state() != Some(ConnectionState::Live)
     });
     assert!(
         w.session().live.update().is_none(),
@@ -190,7 +190,7 @@ fn unplug(w: &mut Window) {
     );
     pull(w, 0.0);
     w.wait("the plug", 30, |s| {
-        s.session.live.state() == Some(State::Live)
+        s.session.live.state() == Some(ConnectionState::Live)
     });
     // The rest is still known.
     w.wait("strains", 30, |s| {
@@ -207,7 +207,7 @@ fn pull(w: &Window, seconds: f64) {
 }
 
 /// What the window saw while it was recording.
-fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, Update> {
+fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, LiveUpdate> {
     w.wait("no touch", 20, |s| {
         s.session.live.update().is_some_and(|u| u.contact.is_none())
             && s.session.live.truth().is_none()
@@ -229,7 +229,7 @@ fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, Update> {
 }
 
 /// The recording says the very same, in the window's own thread and in another.
-fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
+fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, LiveUpdate>) {
     let inputs = w.session().document.inputs();
     let budget = inputs.project.budget.budget();
     let sensing = design::sensing(&inputs, &budget, &unwatched).unwrap();

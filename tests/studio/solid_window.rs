@@ -121,14 +121,14 @@ fn corrected(w: &mut Window) {
 
 /// Which face the vertex of the part nearest to a place (mm) is on: -1 outside, 1 inside.
 fn side_at(studio: &Studio, place: DVec3) -> f64 {
-    use hapdef::mesh::walls::Side;
+    use hapdef::mesh::walls::WallSide;
     let part = &studio.session.document.part;
     let distance = |v: &usize| part.positions()[*v].distance(place / 1000.0);
     let nearest = (0..part.positions().len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let faces = studio.session.advice().unwrap().faces.as_ref().unwrap();
     match faces.sides[nearest.unwrap()] {
-        Side::Outside => -1.0,
-        Side::Rim | Side::Frame => 0.0,
-        Side::Inside => 1.0,
+        WallSide::Outside => -1.0,
+        WallSide::Rim | WallSide::Frame => 0.0,
+        WallSide::Inside => 1.0,
     }
 }

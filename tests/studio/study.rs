@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hapdef::io::study_folder::{Cost, Outcome, StudyFolder};
+use hapdef::io::study_folder::{StudyFolder, UnitCost, UnitOutcome};
 use hapdef::parameter_study::Points;
 use hapdef::studio::Tab;
 
@@ -54,7 +54,7 @@ fn found(home: &Path) -> StudyFolder {
             ),
             ("mass_g".to_owned(), Some(14.0 * wall + 0.1 * gauges)),
         ];
-        let outcome = Outcome {
+        let outcome = UnitOutcome {
             version: folder.plan.version.clone(),
             study: folder.plan.study.clone(),
             base: folder.plan.base.clone(),
@@ -64,7 +64,7 @@ fn found(home: &Path) -> StudyFolder {
             error: failed.then(|| "the wall is too thin".into()),
             cautions: Vec::new(),
         };
-        let cost = Cost {
+        let cost = UnitCost {
             unit,
             cpu_seconds: 1.0,
             seconds: 1.0,

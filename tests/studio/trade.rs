@@ -11,9 +11,9 @@ use hapdef::budget::{Quality, unwatched};
 use hapdef::cli;
 use hapdef::design::{self, Finest, Inputs};
 use hapdef::io::ProcessMeter;
-use hapdef::io::trade_file::{self, Record};
+use hapdef::io::trade_file::{self, TradeRecord};
 use hapdef::studio::{Stage, Standing};
-use hapdef::trade::{Knob, Measured, Setting, TradeConstraint, measure};
+use hapdef::trade::{Knob, Measured, TradeConstraint, TradeSetting, measure};
 use window::Window;
 
 fn hapdef(arguments: &[&str]) -> Output {
@@ -191,10 +191,10 @@ fn the_dial_writes_a_project_that_keeps_its_word() {
 fn knobs_do_what_they_say() {
     let folder = tempfile::tempdir().unwrap();
     let inputs = inputs(&small(folder.path()));
-    let centre = Setting::centre(&inputs.project);
+    let centre = TradeSetting::centre(&inputs.project);
     let judge = Finest::new(&inputs, &unwatched).unwrap();
     let meter = ProcessMeter::default();
-    let run = |setting: &Setting| {
+    let run = |setting: &TradeSetting| {
         let point = measure(&inputs, setting, &judge, &meter, &unwatched).unwrap();
         point.outcome.unwrap()
     };
@@ -202,7 +202,7 @@ fn knobs_do_what_they_say() {
     assert!(base.error_mm.is_finite() && base.error_mm < 60.0);
     // The same setting gives the same answer.
     assert_eq!(run(&centre).error_mm, base.error_mm);
-    let turn = |setting: &Setting, base: &Measured, knob: Knob| {
+    let turn = |setting: &TradeSetting, base: &Measured, knob: Knob| {
         let turned = setting.neighbours(knob)[0];
         assert_eq!(setting.differs_in(&turned), Some(knob));
         assert!(!turned.answers(&inputs.project));
@@ -229,7 +229,7 @@ fn knobs_do_what_they_say() {
 #[test]
 fn the_bundled_trade_is_of_the_bundled_limb() {
     let text = include_str!("../../assets/trade/trade.json");
-    let record = Record::parse(text).unwrap();
+    let record = TradeRecord::parse(text).unwrap();
     let inputs = cli::bundled().unwrap().inputs;
     assert!(
         record.is_of(&inputs),
@@ -239,7 +239,7 @@ fn the_bundled_trade_is_of_the_bundled_limb() {
     assert_eq!(tables, include_str!("../../assets/trade/trade.md"));
     assert!(include_str!("../../RESULTS.md").contains(tables.trim_end()));
     for quality in [Quality::Draft, Quality::Standard] {
-        let named = Setting::named(&inputs.project, quality);
+        let named = TradeSetting::named(&inputs.project, quality);
         assert!(
             record
                 .points
@@ -347,7 +347,7 @@ fn a_trade_is_measured_in_the_window_and_kept() {
         .unwrap()
         .unwrap()
         .path();
-    let record = Record::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let record = TradeRecord::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
     assert!(!record.points.is_empty());
     assert!(record.is_of(&inputs(&project)));
     assert!(

@@ -2,22 +2,27 @@
 
 use std::collections::VecDeque;
 
-use super::super::check::Reference;
+use super::super::check::CheckPlace;
 use super::super::plan::Planned;
-use super::{Collector, Ended, News, Phase, RESTARTS};
+use super::{Collector, CollectorNews, Phase, RESTARTS, RunEnd};
 use crate::plain;
 
 impl Collector {
     /// Presses a reference too: first of all, again and again, and last of all.
     #[must_use]
-    pub fn checked_at(mut self, reference: Reference) -> Self {
+    pub fn checked_at(mut self, reference: CheckPlace) -> Self {
         self.check.every = reference.every;
         self.check.reference = Some(reference);
         self
     }
 
     /// The reference was pressed.
-    pub(super) fn checked(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+    pub(super) fn checked(
+        &mut self,
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(CollectorNews),
+    ) {
         self.check.now = false;
         self.phase = Phase::Retract;
         let tip = self.machine.sensor.map(|s| s.channel);
@@ -31,7 +36,7 @@ impl Collector {
         let off = match (answer, &reference.answer) {
             (Err(why), Some(_)) => Some(why),
             (Err(why), None) => {
-                self.end(Ended::Stopped(format!(
+                self.end(RunEnd::Stopped(format!(
                     "the place that is to be pressed again and again cannot be pressed at all: {why}: look how the limb is mounted, and whether the tip and its sensor work"
                 )));
                 return;
@@ -52,9 +57,9 @@ impl Collector {
         match off {
             None => {
                 if let Some(answer) = reference.answer.as_ref().filter(|_| confirmed) {
-                    tell(News::Answer(answer.clone()));
+                    tell(CollectorNews::Answer(answer.clone()));
                 }
-                tell(News::Note("checked".into()));
+                tell(CollectorNews::Note("checked".into()));
                 self.check.begun = true;
                 self.check.since.clear();
                 self.check.homed = 0;
@@ -77,11 +82,11 @@ impl Collector {
     }
 
     /// Whether what was pressed since the last check was right will never be known: it is pressed again. How many those are.
-    pub(super) fn doubt(&mut self, why: &str, tell: &mut dyn FnMut(News)) -> usize {
+    pub(super) fn doubt(&mut self, why: &str, tell: &mut dyn FnMut(CollectorNews)) -> usize {
         if self.check.reference.is_none() {
             return 0;
         }
-        tell(News::Note(format!("moved {why}")));
+        tell(CollectorNews::Note(format!("moved {why}")));
         let mut plan = VecDeque::from(std::mem::take(&mut self.check.since));
         let discarded: Vec<usize> = plan.iter().map(|(number, _)| *number).collect();
         let doubted = discarded.len();
@@ -93,13 +98,19 @@ impl Collector {
         self.check.begun = false;
         if doubted > 0 {
             self.check.every = (doubted / 2).max(1);
-            tell(News::Discarded(discarded));
+            tell(CollectorNews::Discarded(discarded));
         }
         doubted
     }
 
     /// The reference is not as it was.
-    fn moved(&mut self, why: &str, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+    fn moved(
+        &mut self,
+        why: &str,
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(CollectorNews),
+    ) {
         let discarded = match self.doubt(why, tell) {
             0 => String::new(),
             n => format!(
@@ -112,12 +123,14 @@ impl Collector {
             format!("the place that is pressed again and again is not as it was: {why}{discarded}");
         self.check.homed += 1;
         if self.machine.home.is_empty() || self.check.homed > RESTARTS {
-            self.end(Ended::Stopped(format!(
+            self.end(RunEnd::Stopped(format!(
                 "{what}. A motor lost steps, the limb slipped, or a gauge is off: find the axes again and look how the limb stands"
             )));
             return;
         }
-        tell(News::Say(format!("{what}; the axes are sent home")));
+        tell(CollectorNews::Say(format!(
+            "{what}; the axes are sent home"
+        )));
         self.open(true, now_us, out);
     }
 
@@ -127,15 +140,15 @@ impl Collector {
         number: usize,
         planned: Planned,
         why: String,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         if self.failed_before.insert(number) {
             let text = format!("press {number} failed: {why}. It is tried again at the end");
-            tell(News::Say(text));
+            tell(CollectorNews::Say(text));
             self.plan.push_back((number, planned));
         } else {
             let failed = Some(why);
-            tell(News::Press { number, failed });
+            tell(CollectorNews::Press { number, failed });
         }
     }
 }

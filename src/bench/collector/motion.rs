@@ -18,7 +18,7 @@ pub(super) enum Moved {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum MotionStage {
     /// The axis of this number is on its way.
     Axis(usize),
     Finishing,
@@ -29,7 +29,7 @@ enum Stage {
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
     targets: Vec<(char, f64, f64)>,
-    stage: Stage,
+    stage: MotionStage,
     asked: u32,
     late_us: u64,
     /// An axis that was stopped on its way, with the ends of that way: where it stands is asked.
@@ -51,7 +51,7 @@ impl Motion {
         let longest = targets.iter().map(|t| LONGEST / t.2).sum::<f64>();
         let motion = Self {
             targets,
-            stage: Stage::Axis(0),
+            stage: MotionStage::Axis(0),
             asked: 0,
             late_us: now_us + SPARE_US + (longest * 1e6) as u64,
             stopped: None,
@@ -72,7 +72,7 @@ impl Motion {
         marlin.order("M400", 0, now_us, out);
         Self {
             targets: Vec::new(),
-            stage: Stage::Finishing,
+            stage: MotionStage::Finishing,
             asked: 0,
             late_us: now_us + SPARE_US,
             stopped: Some((axis, way)),
@@ -105,16 +105,16 @@ impl Motion {
         out: &mut Vec<u8>,
     ) -> Moved {
         match self.stage {
-            Stage::Axis(k) if k + 1 < self.targets.len() => {
-                self.stage = Stage::Axis(k + 1);
+            MotionStage::Axis(k) if k + 1 < self.targets.len() => {
+                self.stage = MotionStage::Axis(k + 1);
                 self.send(k + 1, marlin, now_us, out);
             }
-            Stage::Axis(_) => {
-                self.stage = Stage::Finishing;
+            MotionStage::Axis(_) => {
+                self.stage = MotionStage::Finishing;
                 marlin.order("M400", 0, now_us, out);
             }
-            Stage::Finishing => self.ask(marlin, now_us, out),
-            Stage::Asking => {
+            MotionStage::Finishing => self.ask(marlin, now_us, out),
+            MotionStage::Asking => {
                 if let Some((axis, way)) = self.stopped {
                     self.found = position_in(said, axis).filter(|at| between(*at, way));
                 }
@@ -131,7 +131,7 @@ impl Motion {
     }
 
     fn ask(&mut self, marlin: &mut Marlin, now_us: u64, out: &mut Vec<u8>) {
-        self.stage = Stage::Asking;
+        self.stage = MotionStage::Asking;
         self.asked += 1;
         marlin.order("M114", 0, now_us, out);
     }

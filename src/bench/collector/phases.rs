@@ -2,12 +2,17 @@
 
 use super::super::machine::Pose;
 use super::super::press::SampleMean;
-use super::{Collector, Doing, Ended, FAIL, FAILURES, FREE_N, News, Phase};
+use super::{Collector, CollectorNews, Doing, FAIL, FAILURES, FREE_N, Phase, RunEnd};
 
 impl Collector {
-    pub(super) fn read(&mut self, what: Option<&str>, now_us: u64, tell: &mut dyn FnMut(News)) {
+    pub(super) fn read(
+        &mut self,
+        what: Option<&str>,
+        now_us: u64,
+        tell: &mut dyn FnMut(CollectorNews),
+    ) {
         if let Some(what) = what {
-            tell(News::Note(format!("read {what}")));
+            tell(CollectorNews::Note(format!("read {what}")));
         }
         let from_us = now_us + self.limits.settle_us;
         self.doing = Doing::Reading {
@@ -22,7 +27,7 @@ impl Collector {
         &mut self,
         now_us: u64,
         out: &mut Vec<u8>,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         if self.check.is_due(self.plan.len()) {
             self.check.begin();
@@ -36,9 +41,9 @@ impl Collector {
             _ => "check".into(),
         };
         let number = self.plan.front().map(|(number, _)| *number);
-        tell(News::Begun(number.filter(|_| !self.check.now)));
+        tell(CollectorNews::Begun(number.filter(|_| !self.check.now)));
         let (p, n) = (planned.at * 1e3, planned.normal);
-        tell(News::Note(format!(
+        tell(CollectorNews::Note(format!(
             "{what} {:.4} {:.4} {:.4} {:.5} {:.5} {:.5}",
             p.x, p.y, p.z, n.x, n.y, n.z
         )));
@@ -51,7 +56,12 @@ impl Collector {
     }
 
     /// What was waited for has come.
-    pub(super) fn next(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+    pub(super) fn next(
+        &mut self,
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(CollectorNews),
+    ) {
         let doing = std::mem::replace(&mut self.doing, Doing::Nothing);
         let reading = match doing {
             Doing::Reading { reading, .. } => Some(reading),
@@ -155,7 +165,7 @@ impl Collector {
         pose: &Pose,
         now_us: u64,
         out: &mut Vec<u8>,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         let mean = reading.mean();
         let early = self.radial > pose.radial + self.limits.before - 1.5 * self.limits.step;
@@ -169,7 +179,7 @@ impl Collector {
             self.contact = self.radial;
             self.check.met(self.radial - pose.radial);
             self.forces = [None, self.machine.force(&mean, &self.rest)];
-            tell(News::Note(format!(
+            tell(CollectorNews::Note(format!(
                 "contact {:.4}",
                 (pose.radial - self.radial) * 1e3
             )));
@@ -185,7 +195,7 @@ impl Collector {
         }
     }
 
-    pub(super) fn read_step(&mut self, now_us: u64, tell: &mut dyn FnMut(News)) {
+    pub(super) fn read_step(&mut self, now_us: u64, tell: &mut dyn FnMut(CollectorNews)) {
         self.phase = Phase::Read;
         let depth = (self.contact - self.radial) * 1e3;
         self.read(Some(&format!("depth {depth:.4}")), now_us, tell);
@@ -233,15 +243,15 @@ impl Collector {
         self.go_radial(self.retreat, now_us, out);
     }
 
-    pub(super) fn pressed(&mut self, tell: &mut dyn FnMut(News)) {
+    pub(super) fn pressed(&mut self, tell: &mut dyn FnMut(CollectorNews)) {
         let Some((number, planned)) = self.plan.pop_front() else {
             return;
         };
         let failed = self.failed.take();
         if let Some(why) = &failed {
-            tell(News::Note(format!("failed {number} {why}")));
+            tell(CollectorNews::Note(format!("failed {number} {why}")));
         } else {
-            tell(News::Note(format!("pressed {number}")));
+            tell(CollectorNews::Note(format!("pressed {number}")));
             self.check.made(number, planned);
         }
         self.restarts = 0;
@@ -250,7 +260,7 @@ impl Collector {
         self.tried[0] += 1;
         self.tried[1] += usize::from(why.is_some());
         match failed {
-            None => tell(News::Press { number, failed }),
+            None => tell(CollectorNews::Press { number, failed }),
             Some(why) if !self.check.look_first(number, planned, &why) => {
                 self.failed(number, planned, why, tell);
             }
@@ -261,7 +271,7 @@ impl Collector {
         let often = none >= FAILURES && none as f64 > FAIL * tried as f64;
         if let Some(why) = why.filter(|_| self.failures >= FAILURES || often) {
             // The tip is out of the way already.
-            self.end(Ended::Stopped(format!(
+            self.end(RunEnd::Stopped(format!(
                 "{none} of {tried} presses failed, the last because {why}: look how the limb is mounted, and whether the tip and its sensor work"
             )));
             return;

@@ -2,7 +2,7 @@
 
 use super::super::marlin::MachineReply;
 use super::motion::Moved;
-use super::{Collector, Doing, FIRST_US, News, Phase, RESTARTS, SILENT_US};
+use super::{Collector, CollectorNews, Doing, FIRST_US, Phase, RESTARTS, SILENT_US};
 
 impl Collector {
     /// Takes in what the machine says.
@@ -11,7 +11,7 @@ impl Collector {
         bytes: &[u8],
         now_us: u64,
         out: &mut Vec<u8>,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         for reply in self.marlin.push(bytes, now_us, out) {
             self.take(reply, now_us, out, tell);
@@ -23,7 +23,7 @@ impl Collector {
         reply: MachineReply,
         now_us: u64,
         out: &mut Vec<u8>,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         if self.phase == Phase::Over {
             return;
@@ -40,7 +40,7 @@ impl Collector {
         }
     }
 
-    fn restarted(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+    fn restarted(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(CollectorNews)) {
         // Boards begin anew when their port is opened.
         let opening = self.phase == Phase::Opening && self.moves == 0;
         if !opening {
@@ -50,7 +50,7 @@ impl Collector {
                 self.lose(why, out);
                 return;
             }
-            tell(News::Say(
+            tell(CollectorNews::Say(
                 "the machine began anew: its axes are sent home, and the press is repeated".into(),
             ));
             self.unmake(tell);
@@ -60,12 +60,12 @@ impl Collector {
     }
 
     /// The press that goes on is none: it is made again.
-    fn unmake(&mut self, tell: &mut dyn FnMut(News)) {
+    fn unmake(&mut self, tell: &mut dyn FnMut(CollectorNews)) {
         match self.plan.front() {
             Some((number, _)) if !self.check.now => {
-                tell(News::Note(format!("again {number}")));
+                tell(CollectorNews::Note(format!("again {number}")));
             }
-            _ => tell(News::Note("again".into())),
+            _ => tell(CollectorNews::Note("again".into())),
         }
         self.check.now = false;
         self.failed = None;
@@ -76,7 +76,7 @@ impl Collector {
         said: &[String],
         now_us: u64,
         out: &mut Vec<u8>,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         match &mut self.doing {
             Doing::Orders(orders) => match orders.pop_front() {
@@ -101,7 +101,7 @@ impl Collector {
     }
 
     /// To be called every few milliseconds.
-    pub fn look(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+    pub fn look(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(CollectorNews)) {
         if self.phase == Phase::Over {
             return;
         }

@@ -1,8 +1,8 @@
 use glam::DVec3;
 
-use super::super::check::Reference;
+use super::super::check::CheckPlace;
 use super::super::machine::tests::paper;
-use super::super::{Contact, Mount, PrinterFaults, SimulatedPrinter, plan};
+use super::super::{ContactLaw, PrinterFaults, SimulatedPrinter, TableMount, plan};
 use super::*;
 use crate::limb::LimbSpec;
 use crate::mesh::{TriMesh, sample};
@@ -10,7 +10,7 @@ use crate::mesh::{TriMesh, sample};
 /// A limb on a simulated bench whose board reads three gauges and the tip.
 struct Bench<'a> {
     printer: SimulatedPrinter,
-    contact: Contact<'a>,
+    contact: ContactLaw<'a>,
     now_us: u64,
     /// The hardest that the tip really pressed (N).
     hardest: f64,
@@ -32,12 +32,12 @@ impl<'a> Bench<'a> {
     fn new(
         machine: &'a Machine,
         surface: &'a TriMesh,
-        mount: Mount,
+        mount: TableMount,
         faults: PrinterFaults,
     ) -> Self {
         Self {
             printer: SimulatedPrinter::new([('X', 0.0), ('Z', 0.0), ('E', 0.0)], faults, 5),
-            contact: Contact {
+            contact: ContactLaw {
                 surface,
                 mount,
                 machine,
@@ -56,7 +56,7 @@ impl<'a> Bench<'a> {
 
     fn counts(&mut self) -> Vec<f64> {
         let printer = &self.printer;
-        let number = |axis: &crate::bench::Axis| printer.real(axis.letter).unwrap();
+        let number = |axis: &crate::bench::MachineAxis| printer.real(axis.letter).unwrap();
         let pose = self.contact.machine.pose_of(number);
         let push = self.contact.push(&pose);
         let force = push.map_or(0.0, |p| p.touch.force);
@@ -73,7 +73,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Until it has ended, or for so many seconds.
-    fn run(&mut self, collector: &mut Collector, seconds: f64) -> Vec<News> {
+    fn run(&mut self, collector: &mut Collector, seconds: f64) -> Vec<CollectorNews> {
         let mut news = Vec::new();
         let until = self.now_us + (seconds * 1e6) as u64;
         while collector.ended().is_none() && self.now_us < until {
@@ -104,14 +104,16 @@ impl<'a> Bench<'a> {
 
 impl Bench<'_> {
     /// Remembers where what was pressed really was.
-    fn note(&mut self, news: &[News]) {
+    fn note(&mut self, news: &[CollectorNews]) {
         for one in news {
             match one {
-                News::Press {
+                CollectorNews::Press {
                     number,
                     failed: None,
                 } => self.pressed.push((*number, self.place)),
-                News::Discarded(none) => self.pressed.truncate(self.pressed.len() - none.len()),
+                CollectorNews::Discarded(none) => {
+                    self.pressed.truncate(self.pressed.len() - none.len());
+                }
                 _ => {}
             }
         }
@@ -120,7 +122,7 @@ impl Bench<'_> {
 
 struct Case {
     surface: TriMesh,
-    mount: Mount,
+    mount: TableMount,
     machine: Machine,
 }
 
@@ -129,7 +131,7 @@ impl Case {
         let (surface, _) = LimbSpec::default().build().unwrap();
         let (low, high) = surface.bounds();
         Self {
-            mount: Mount::upright(DVec3::Z, DVec3::X, (low + high) / 2.0),
+            mount: TableMount::upright(DVec3::Z, DVec3::X, (low + high) / 2.0),
             surface,
             machine: paper(),
         }
@@ -148,17 +150,17 @@ impl Case {
         let presses = reach.presses.into_iter().take(places.len() / 4);
         Collector::new(
             self.machine.clone(),
-            Limits::default(),
+            PressLimits::default(),
             presses.enumerate(),
             reach.retreat,
         )
     }
 }
 
-fn done(news: &[News]) -> Vec<usize> {
+fn done(news: &[CollectorNews]) -> Vec<usize> {
     (news.iter())
         .filter_map(|n| match n {
-            News::Press {
+            CollectorNews::Press {
                 number,
                 failed: None,
             } => Some(*number),
@@ -168,10 +170,10 @@ fn done(news: &[News]) -> Vec<usize> {
 }
 
 /// Every reading that is kept, with the place that was really pressed meanwhile against the one that was meant.
-fn depths(news: &[News]) -> Vec<f64> {
+fn depths(news: &[CollectorNews]) -> Vec<f64> {
     (news.iter())
         .filter_map(|n| match n {
-            News::Note(note) => note.strip_prefix("read depth ")?.parse().ok(),
+            CollectorNews::Note(note) => note.strip_prefix("read depth ")?.parse().ok(),
             _ => None,
         })
         .collect()
@@ -183,7 +185,7 @@ fn a_plan_is_pressed_step_by_step() {
     let mut collector = case.collector(6);
     let mut bench = case.bench(PrinterFaults::default());
     let news = bench.run(&mut collector, 1e4);
-    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(collector.ended(), Some(&RunEnd::Finished));
     assert_eq!(done(&news), [0, 1, 2, 3, 4, 5]);
     let depths = depths(&news);
     // 10 N/mm to 2 mm by 0.15 mm: from the contact on fourteen readings each.
@@ -213,7 +215,7 @@ fn lines_that_are_lost_or_garbled_change_nothing_but_the_time() {
     let mut collector = case.collector(4);
     let mut bench = case.bench(faults);
     let news = bench.run(&mut collector, 1e5);
-    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(collector.ended(), Some(&RunEnd::Finished));
     assert_eq!(done(&news), done(&wanted));
     assert_eq!(depths(&news), depths(&wanted));
     assert!(collector.resent() > 10, "{}", collector.resent());
@@ -230,7 +232,7 @@ fn a_machine_that_began_anew_is_sent_home_and_the_press_is_repeated() {
     let mut bench = case.bench(faults);
     let news = bench.run(&mut collector, 1e5);
     assert!(bench.printer.restarts > 0);
-    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(collector.ended(), Some(&RunEnd::Finished));
     assert_eq!(done(&news), [0, 1, 2, 3]);
     // Without a way to find its place again it is not gone on with.
     let mut machine = case.machine.clone();
@@ -241,7 +243,7 @@ fn a_machine_that_began_anew_is_sent_home_and_the_press_is_repeated() {
     bench.run(&mut collector, 1e5);
     let ended = collector.ended();
     assert!(
-        matches!(ended, Some(Ended::Stopped(why)) if why.contains("began anew")),
+        matches!(ended, Some(RunEnd::Stopped(why)) if why.contains("began anew")),
         "{ended:?}"
     );
 }
@@ -271,7 +273,7 @@ fn a_force_beyond_the_limit_stops_and_takes_back() {
     bench.run(&mut collector, 1e4);
     let ended = collector.ended();
     assert!(
-        matches!(ended, Some(Ended::Stopped(why)) if why.contains("the most")),
+        matches!(ended, Some(RunEnd::Stopped(why)) if why.contains("the most")),
         "{ended:?}"
     );
     let counts = bench.counts();
@@ -290,7 +292,7 @@ fn a_board_that_falls_silent_stops_it_with_the_tip_taken_back() {
     bench.run(&mut collector, 100.0);
     let ended = collector.ended();
     assert!(
-        matches!(ended, Some(Ended::Stopped(why)) if why.contains("silent")),
+        matches!(ended, Some(RunEnd::Stopped(why)) if why.contains("silent")),
         "{ended:?}"
     );
     assert_eq!(bench.counts()[3], 400.0);
@@ -305,7 +307,7 @@ fn a_limb_that_is_not_where_it_should_be_is_found_out() {
     let news = bench.run(&mut collector, 1e5);
     let ended = collector.ended();
     assert!(
-        matches!(ended, Some(Ended::Stopped(why)) if why.contains("mounted")),
+        matches!(ended, Some(RunEnd::Stopped(why)) if why.contains("mounted")),
         "{ended:?}"
     );
     assert!(done(&news).is_empty());
@@ -326,7 +328,7 @@ fn what_is_paused_goes_on_and_what_is_stopped_ends_out_of_the_way() {
     collector.stop("asked to", bench.now_us, &mut out);
     bench.printer.receive(&out, &mut Vec::new());
     bench.run(&mut collector, 100.0);
-    assert_eq!(collector.ended(), Some(&Ended::Stopped("asked to".into())));
+    assert_eq!(collector.ended(), Some(&RunEnd::Stopped("asked to".into())));
     assert_eq!(bench.counts()[3], 400.0);
 }
 
@@ -340,7 +342,7 @@ fn a_machine_that_cannot_be_believed_is_told_to_stop() {
     let halted = b"Error:Printer halted. kill() called!\n";
     collector.receive(halted, bench.now_us, &mut out, &mut |_| {});
     assert!(out.ends_with(b"M410\n"));
-    assert!(matches!(collector.ended(), Some(Ended::Stopped(_))));
+    assert!(matches!(collector.ended(), Some(RunEnd::Stopped(_))));
 }
 
 #[test]
@@ -361,7 +363,7 @@ fn steps_that_a_motor_loses_are_noticed_and_their_presses_made_again() {
     bench.run(&mut collector, 1e5);
     assert!(far(&blind, &bench.pressed) > 3e-3);
     // Looked at again and again, none is.
-    let reference = Reference {
+    let reference = CheckPlace {
         // There, the waves rise along all axes.
         at: blind.plan[4].1,
         every: 5,
@@ -370,13 +372,13 @@ fn steps_that_a_motor_loses_are_noticed_and_their_presses_made_again() {
     let mut bench = case.bench(faults);
     let mut collector = case.collector(40).checked_at(reference.clone());
     let news = bench.run(&mut collector, 1e6);
-    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(collector.ended(), Some(&RunEnd::Finished));
     let mut numbers: Vec<usize> = bench.pressed.iter().map(|p| p.0).collect();
     numbers.sort_unstable();
     assert_eq!(numbers, (0..blind.left()).collect::<Vec<_>>());
     let off = far(&blind, &bench.pressed);
     assert!(off < 1e-3, "{off}");
-    let again = |n: &&News| matches!(n, News::Discarded(_));
+    let again = |n: &&CollectorNews| matches!(n, CollectorNews::Discarded(_));
     assert!(news.iter().filter(again).count() >= 2);
     // Without a way to find its place it is not gone on with.
     let mut bench = case.bench(faults);
@@ -385,7 +387,7 @@ fn steps_that_a_motor_loses_are_noticed_and_their_presses_made_again() {
     bench.run(&mut collector, 1e6);
     let ended = collector.ended();
     assert!(
-        matches!(ended, Some(Ended::Stopped(why)) if why.contains("lost steps")),
+        matches!(ended, Some(RunEnd::Stopped(why)) if why.contains("lost steps")),
         "{ended:?}"
     );
 }
@@ -394,7 +396,7 @@ fn steps_that_a_motor_loses_are_noticed_and_their_presses_made_again() {
 fn rounds_of_presses_are_one_run_and_its_end_is_waited_for() {
     let case = Case::new();
     let all: Vec<(usize, Planned)> = case.collector(9).plan.into_iter().collect();
-    let reference = Reference {
+    let reference = CheckPlace {
         at: all[4].1,
         every: 20,
         answer: None,
@@ -406,7 +408,8 @@ fn rounds_of_presses_are_one_run_and_its_end_is_waited_for() {
         if checked {
             collector = collector.checked_at(reference.clone());
         }
-        let waits = |news: &[News]| news.iter().filter(|n| **n == News::Waits).count();
+        let waits =
+            |news: &[CollectorNews]| news.iter().filter(|n| **n == CollectorNews::Waits).count();
         let first = bench.run(&mut collector, 600.0);
         assert_eq!((done(&first), waits(&first)), (vec![0, 1, 2], 1));
         // Nothing moves, and it is not said again.
@@ -418,10 +421,10 @@ fn rounds_of_presses_are_one_run_and_its_end_is_waited_for() {
         let off = farthest(&all, &bench.pressed);
         assert!(off < 1e-3, "{off}");
         // What was pressed is believed before more is asked for.
-        let sure = |news: &[News]| news.contains(&News::Note("checked".into()));
+        let sure = |news: &[CollectorNews]| news.contains(&CollectorNews::Note("checked".into()));
         assert!(!checked || (sure(&first) && sure(&second)));
         collector.go_on([]);
-        assert_eq!(collector.ended(), Some(&Ended::Finished));
+        assert_eq!(collector.ended(), Some(&RunEnd::Finished));
     }
 }
 
@@ -449,7 +452,7 @@ fn a_press_that_failed_is_tried_again_at_the_end() {
     assert_eq!(last.0, 2);
     last.1.pose.along = lost;
     let news = bench.run(&mut collector, 1e4);
-    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(collector.ended(), Some(&RunEnd::Finished));
     assert_eq!(done(&news), [3, 4, 5, 2]);
 }
 

@@ -1,7 +1,7 @@
 //! What the board's samples say while the machine moves: force limits, contact, and readings.
 
 use super::motion::Motion;
-use super::{Collector, Doing, Marlin, News, Phase};
+use super::{Collector, CollectorNews, Doing, Marlin, Phase};
 
 impl Collector {
     /// Takes in a sample of the board.
@@ -10,7 +10,7 @@ impl Collector {
         counts: &[f64],
         now_us: u64,
         out: &mut Vec<u8>,
-        tell: &mut dyn FnMut(News),
+        tell: &mut dyn FnMut(CollectorNews),
     ) {
         self.sample_us = Some(now_us);
         if self.is_watched() {
@@ -52,11 +52,11 @@ impl Collector {
         }
         reading.push(counts);
         if *kept {
-            tell(News::Keep);
+            tell(CollectorNews::Keep);
         }
         if now_us >= *until_us && reading.samples() >= 3 {
             if *kept {
-                tell(News::Note("end".into()));
+                tell(CollectorNews::Note("end".into()));
             }
             self.next(now_us, out, tell);
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::args::BoardArgs;
-use crate::board::{ChannelFault, Fault, Faults, GivenPress, Press, Script, aside};
+use crate::board::{ChannelFault, Fault, Faults, GivenPress, PressScript, ScriptedPress, aside};
 use crate::cli::simulate::in_file;
 use crate::design::{self, Inputs, Sensing};
 use crate::elasticity::Touch;
@@ -13,14 +13,14 @@ use crate::uncertainty::Making;
 use crate::wire::MOST_CHANNELS;
 
 /// What was asked for, as far as it can be known to make sense without the model.
-pub(super) struct Plan {
+pub(super) struct BoardPlan {
     pub channels: usize,
     pub faults: Faults,
     /// Instead of random touches.
     pub presses: Option<Vec<GivenPress>>,
 }
 
-impl Plan {
+impl BoardPlan {
     /// Of the options and the files that they name.
     ///
     /// # Errors
@@ -97,13 +97,17 @@ fn read_script(path: &Path, part: &TriMesh) -> anyhow::Result<Vec<GivenPress>> {
 }
 
 /// Presses put onto the part's surface.
-pub(super) fn on_surface(presses: &[GivenPress], inputs: &Inputs, sensing: &Sensing) -> Script {
+pub(super) fn on_surface(
+    presses: &[GivenPress],
+    inputs: &Inputs,
+    sensing: &Sensing,
+) -> PressScript {
     let map = &sensing.drawn.map;
     let up = inputs.project.part.axis.stance(&inputs.part).up();
     let press = |asked: &GivenPress| {
         let (at, _) = map.mesh.index().nearest(asked.position);
         let normal = map.mesh.normal(at);
-        Press {
+        ScriptedPress {
             start_s: asked.start_s,
             duration_s: asked.duration_s,
             touch: Touch {
@@ -116,7 +120,7 @@ pub(super) fn on_surface(presses: &[GivenPress], inputs: &Inputs, sensing: &Sens
             aside: aside(normal, up, asked.tilt_deg, asked.towards_deg),
         }
     };
-    Script::Given(presses.iter().map(press).collect())
+    PressScript::Given(presses.iter().map(press).collect())
 }
 
 #[cfg(test)]
@@ -163,7 +167,7 @@ mod tests {
         assert!((wander(&plain).0 - 4e-6).abs() < 1e-15 && wander(&plain).1 > 0.0);
         assert!((wander(&told).0 - 1e-6).abs() < 1e-15 && wander(&told).1 == 5.0);
         // Touches that push aside have more columns in the truth.
-        let plan = Plan::new(&plain, &inputs).unwrap();
+        let plan = BoardPlan::new(&plain, &inputs).unwrap();
         assert!(plan.says_more(&plain, &inputs.project.making()));
     }
 

@@ -1,10 +1,10 @@
 //! Asks for one press after another, and takes each as it comes.
 
-use super::summary::Row;
+use super::summary::PressRow;
 use crate::cli::out;
 use crate::inference::KnownPress;
 use crate::io::points::AskedPoint;
-use crate::live::{FinishedPress, Pipeline, Presses, Update};
+use crate::live::{FinishedPress, LiveUpdate, Pipeline, Presses};
 use crate::mesh::TriMesh;
 
 /// What was asked for, and what came.
@@ -42,7 +42,7 @@ impl AskedPresses {
     }
 
     /// Takes in a sample.
-    pub fn take(&mut self, update: &Update, pipeline: &Pipeline) {
+    pub fn take(&mut self, update: &LiveUpdate, pipeline: &Pipeline) {
         let first = *self.first_us.get_or_insert(update.time_us);
         if update.strain.is_none() {
             return;
@@ -116,7 +116,7 @@ impl AskedPresses {
     }
 
     /// All that was asked for, with what was read on the part.
-    pub fn rows(self, mesh: &TriMesh) -> Vec<Row> {
+    pub fn rows(self, mesh: &TriMesh) -> Vec<PressRow> {
         let row = |(point, pressed): (AskedPoint, Option<FinishedPress>)| {
             let why = match &pressed {
                 None => Some("nothing pressed then".to_owned()),
@@ -131,7 +131,7 @@ impl AskedPresses {
                 force,
                 reading,
             });
-            Row {
+            PressRow {
                 place: point.position * 1e3,
                 force,
                 used: known.is_some(),

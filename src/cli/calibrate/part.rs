@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use anyhow::Context as _;
 use clap::ValueEnum;
 
-use super::summary::{Row, Summary};
+use super::summary::{PressRow, Summary};
 use crate::cli::common::Common;
 use crate::cli::progress::Bar;
 use crate::design::{self, Sensing};
@@ -74,7 +74,7 @@ impl FittedPart {
         mut self,
         fit: &[PartArg],
         common: &Common,
-        rows: &[Row],
+        rows: &[PressRow],
         noise: &[f64],
         off: &Uncertainty,
     ) -> anyhow::Result<Self> {
@@ -111,7 +111,7 @@ impl FittedPart {
 }
 
 /// The presses on a model's own surface.
-fn known(rows: &[Row], sensing: &Sensing) -> Vec<KnownPress> {
+fn known(rows: &[PressRow], sensing: &Sensing) -> Vec<KnownPress> {
     let mesh = &sensing.drawn.map.mesh;
     let known = rows.iter().filter(|row| row.used).filter_map(|row| {
         let known = row.known.clone()?;

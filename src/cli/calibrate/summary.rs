@@ -7,14 +7,14 @@ use serde_json::{Value, json};
 
 use crate::cli::out;
 use crate::design::Sensing;
-use crate::inference::calibration::judged::Outlook;
+use crate::inference::calibration::judged::PressOutlook;
 use crate::inference::{Calibration, KnownPress};
 use crate::io::atomic;
 use crate::io::table::Writing;
 use crate::plain::digits;
 
 /// One press.
-pub struct Row {
+pub struct PressRow {
     /// mm.
     pub place: DVec3,
     /// N.
@@ -28,7 +28,7 @@ pub struct Row {
     pub why: Option<String>,
 }
 
-impl Row {
+impl PressRow {
     /// Leaves it out.
     pub fn leave_out(&mut self, why: String) {
         (self.used, self.why) = (false, Some(why));
@@ -58,9 +58,9 @@ pub struct FoundOfPart {
 
 /// What was found.
 pub struct Summary {
-    pub rows: Vec<Row>,
+    pub rows: Vec<PressRow>,
     pub calibration: Calibration,
-    pub outlook: Outlook,
+    pub outlook: PressOutlook,
     pub of_part: FoundOfPart,
 }
 
@@ -85,7 +85,7 @@ impl Summary {
             let summary = json!({
                 "version": env!("CARGO_PKG_VERSION"),
                 "project": target.display().to_string(),
-                "presses": self.rows.iter().map(Row::json).collect::<Vec<_>>(),
+                "presses": self.rows.iter().map(PressRow::json).collect::<Vec<_>>(),
                 "used": self.calibration.touches,
                 "model_error_percent": rounded(100.0 * self.calibration.relative),
                 "unknown_percent": percent,
@@ -140,7 +140,7 @@ fn rounded(value: f64) -> f64 {
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn write_table(path: &Path, rows: &[Row]) -> anyhow::Result<()> {
+pub fn write_table(path: &Path, rows: &[PressRow]) -> anyhow::Result<()> {
     let gauges = (rows.iter())
         .find_map(|r| Some(r.known.as_ref()?.reading.len()))
         .unwrap_or(0);

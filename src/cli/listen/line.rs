@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use crate::dataset::SignalMatrix;
-use crate::inference::{Contact, Kind};
+use crate::inference::{Contact, TouchKind};
 use crate::learning::TouchEstimator;
-use crate::live::{Guess, ShownEstimator, Update};
+use crate::live::{Guess, LiveUpdate, ShownEstimator};
 
 /// Where nothing touches.
 const NOTHING: &str = "\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"fx_n\":null,\"fy_n\":null,\"fz_n\":null,\"uncertainty_mm\":null";
@@ -13,7 +13,7 @@ const NOTHING: &str = "\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":nul
 /// Of the touch by one of the estimators. Nulls where nothing touches. `uncertainty_mm` is the radius within which a touch lies with a probability of 90 %;
 /// `force_n` presses straight in, and `fx_n`, `fy_n` and `fz_n` are all of the force. Of several touches, the hardest stands
 /// first and by itself; `count` is null where it is not clear what touches.
-pub(super) fn of(update: &Update, estimator: ShownEstimator) -> String {
+pub(super) fn of(update: &LiveUpdate, estimator: ShownEstimator) -> String {
     let mut line = format!("{{\"t_us\":{},", update.time_us);
     let guess = update
         .by(estimator)
@@ -28,7 +28,7 @@ pub(super) fn of(update: &Update, estimator: ShownEstimator) -> String {
 }
 
 /// As [`of`], by a regression that was learned from presses; its radius holds nine of ten places that it was tested on.
-pub(super) fn learned(update: &Update, estimator: &TouchEstimator) -> String {
+pub(super) fn learned(update: &LiveUpdate, estimator: &TouchEstimator) -> String {
     let mut line = format!("{{\"t_us\":{},", update.time_us);
     let strain = update.strain.as_ref().filter(|_| update.contact.is_some());
     let answer = strain.and_then(|strain| {
@@ -52,7 +52,7 @@ pub(super) fn learned(update: &Update, estimator: &TouchEstimator) -> String {
 }
 
 /// What is said of the gauges themselves.
-fn end(mut line: String, update: &Update) -> String {
+fn end(mut line: String, update: &LiveUpdate) -> String {
     let blind = (update.blind).map_or("null".to_owned(), |share| format!("{share:.3}"));
     let _ = write!(
         line,
@@ -89,7 +89,7 @@ fn touch(line: &mut String, contact: &Contact) {
 }
 
 /// How many touch, and each of them.
-fn several(line: &mut String, update: &Update) {
+fn several(line: &mut String, update: &LiveUpdate) {
     let Some(touches) = &update.touches else {
         line.push_str(
             ",\"kind\":null,\"count\":0,\"count_probability\":null,\"area_radius_mm\":null,\"unexplained\":null,\"touches\":[]",
@@ -97,9 +97,9 @@ fn several(line: &mut String, update: &Update) {
         return;
     };
     let kind = match touches.kind {
-        Kind::Points => "points",
-        Kind::Area(_) => "area",
-        Kind::Unclear => "unclear",
+        TouchKind::Points => "points",
+        TouchKind::Area(_) => "area",
+        TouchKind::Unclear => "unclear",
     };
     let _ = write!(line, ",\"kind\":\"{kind}\",\"count\":");
     let _ = match touches.count() {
@@ -112,8 +112,8 @@ fn several(line: &mut String, update: &Update) {
         ",\"count_probability\":{probability:.3},\"area_radius_mm\":"
     );
     let _ = match touches.kind {
-        Kind::Area(radius) => write!(line, "{:.2}", radius * 1e3),
-        Kind::Points | Kind::Unclear => write!(line, "null"),
+        TouchKind::Area(radius) => write!(line, "{:.2}", radius * 1e3),
+        TouchKind::Points | TouchKind::Unclear => write!(line, "null"),
     };
     let _ = write!(
         line,

@@ -13,7 +13,7 @@ impl Log {
         Err("this build writes no MCAP (feature \"mcap\")".into())
     }
 
-    pub fn sample(&mut self, _: &crate::live::Update) -> Result<(), String> {
+    pub fn sample(&mut self, _: &crate::live::LiveUpdate) -> Result<(), String> {
         match *self {}
     }
 

@@ -38,11 +38,11 @@ pub fn order(line: &str) -> Result<Option<ListenerCommand>, String> {
 
 /// Cuts what comes into lines.
 #[derive(Default)]
-struct Lines {
+struct OrderLines {
     open: Vec<u8>,
 }
 
-impl Lines {
+impl OrderLines {
     /// The lines that these bytes end. What is too long for an order is none.
     fn push(&mut self, bytes: &[u8]) -> Vec<String> {
         let mut lines = Vec::new();
@@ -61,7 +61,7 @@ impl Lines {
 /// Somebody who is served, and may give orders.
 pub struct Client {
     stream: TcpStream,
-    lines: Lines,
+    lines: OrderLines,
 }
 
 impl Client {
@@ -73,7 +73,7 @@ impl Client {
         stream.set_nonblocking(true)?;
         Ok(Self {
             stream,
-            lines: Lines::default(),
+            lines: OrderLines::default(),
         })
     }
 
@@ -103,7 +103,7 @@ impl Client {
 /// Takes orders from standard input as long as there is one.
 pub fn from_stdin(commands: Sender<ListenerCommand>, say: fn(&str)) {
     let listen = move || {
-        let mut lines = Lines::default();
+        let mut lines = OrderLines::default();
         let mut buffer = [0; 1024];
         loop {
             if !may_read() {
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn lines_come_in_pieces() {
-        let mut lines = Lines::default();
+        let mut lines = OrderLines::default();
         assert!(lines.push(b"ta").is_empty());
         assert_eq!(lines.push(b"re\nt\nrest"), ["tare", "t"]);
         assert!(lines.push(&vec![b'x'; 3 * MOST]).is_empty());

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::out;
-use crate::given::{LeftOut, Sifted, Table};
+use crate::given::{GivenTable, LeftOutRow, Sifted};
 use crate::io::points;
 
 /// Lines that a screen bears; all that was left out stands in what is written.
@@ -14,30 +14,30 @@ const MOST_LINES: usize = 40;
 const WORTH_A_LINE: f64 = 1.0;
 
 /// Where the rows of both tables stand.
-pub(super) struct Places<'a> {
+pub(super) struct RowPlaces<'a> {
     files: [(&'a Path, Vec<u64>); 2],
 }
 
-impl<'a> Places<'a> {
+impl<'a> RowPlaces<'a> {
     pub fn of(touches: &'a Path, sites: &'a Path) -> Self {
         Self {
             files: [touches, sites].map(|path| (path, points::lines(path))),
         }
     }
 
-    fn line(&self, table: Table, row: usize) -> Option<u64> {
+    fn line(&self, table: GivenTable, row: usize) -> Option<u64> {
         self.file(table).1.get(row).copied()
     }
 
-    fn file(&self, table: Table) -> &(&'a Path, Vec<u64>) {
+    fn file(&self, table: GivenTable) -> &(&'a Path, Vec<u64>) {
         match table {
-            Table::Touches => &self.files[0],
-            Table::Sites => &self.files[1],
+            GivenTable::Touches => &self.files[0],
+            GivenTable::Sites => &self.files[1],
         }
     }
 
     /// File and line.
-    fn words(&self, table: Table, row: usize) -> String {
+    fn words(&self, table: GivenTable, row: usize) -> String {
         let file = self.file(table).0.display();
         match self.line(table, row) {
             Some(line) => format!("{file}, line {line}"),
@@ -51,7 +51,7 @@ impl<'a> Places<'a> {
         let projected = projected.map(|&row| {
             format!(
                 "{}: site {row}: its direction points {:.0}° out of the surface and is laid into it",
-                self.words(Table::Sites, row),
+                self.words(GivenTable::Sites, row),
                 rows.site_angles[row]
             )
         });
@@ -65,13 +65,13 @@ impl<'a> Places<'a> {
         say(&later.map(|l| self.left_out(l)).collect::<Vec<_>>());
     }
 
-    fn left_out(&self, LeftOut { table, row, why }: &LeftOut) -> String {
+    fn left_out(&self, LeftOutRow { table, row, why }: &LeftOutRow) -> String {
         format!("left out: {}: {why}", self.words(*table, *row))
     }
 
     /// The rows that were left out, for programs.
     pub fn json(&self, rows: &Sifted) -> Value {
-        let left_out = rows.left_out.iter().map(|LeftOut { table, row, why }| {
+        let left_out = rows.left_out.iter().map(|LeftOutRow { table, row, why }| {
             json!({
                 "table": table.name(),
                 "row": row,
@@ -85,13 +85,13 @@ impl<'a> Places<'a> {
 
 /// How many rows were left out, where any were.
 pub(super) fn summary(rows: &Sifted) -> Option<String> {
-    let of = |table: Table, all: usize| {
+    let of = |table: GivenTable, all: usize| {
         let left_out = rows.left_out.iter().filter(|l| l.table == table).count();
         (left_out > 0).then(|| format!("{left_out} of {all} {}", table.name()))
     };
     let counts = [
-        of(Table::Touches, rows.touch_distances.len()),
-        of(Table::Sites, rows.site_distances.len()),
+        of(GivenTable::Touches, rows.touch_distances.len()),
+        of(GivenTable::Sites, rows.site_distances.len()),
     ];
     let counts: Vec<String> = counts.into_iter().flatten().collect();
     (!counts.is_empty()).then(|| {

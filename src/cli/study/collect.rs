@@ -15,10 +15,10 @@ use crate::io::svg::escape;
 use crate::io::table::Writing;
 use crate::io::together::Together;
 use crate::plain as words;
-use crate::varied::Collected;
+use crate::varied::CollectedUnits;
 
 #[derive(Args, Debug, Clone)]
-pub struct CollectArgs {
+pub struct StudyCollectArgs {
     /// The study's folder, as `hapdef study plan` wrote it.
     pub folder: PathBuf,
     /// Print one JSON object on stdout.
@@ -30,8 +30,8 @@ pub struct CollectArgs {
 ///
 /// # Errors
 /// A message in the user's terms.
-pub(super) fn run(args: &CollectArgs) -> anyhow::Result<()> {
-    let collected = Collected::of(StudyFolder::open(&args.folder)?, &unwatched)?;
+pub(super) fn run(args: &StudyCollectArgs) -> anyhow::Result<()> {
+    let collected = CollectedUnits::of(StudyFolder::open(&args.folder)?, &unwatched)?;
     let folder = &collected.folder;
     let together = Together::claim(&args.folder)?;
     let costs = costs_csv(folder);
@@ -80,7 +80,7 @@ fn costs_csv(folder: &StudyFolder) -> String {
     table.text()
 }
 
-fn csv(collected: &Collected) -> String {
+fn csv(collected: &CollectedUnits) -> String {
     let fixed = ["state"]
         .into_iter()
         .chain(collected.names.iter().map(String::as_str));
@@ -102,7 +102,7 @@ fn csv(collected: &Collected) -> String {
     table.text()
 }
 
-fn json(collected: &Collected) -> Value {
+fn json(collected: &CollectedUnits) -> Value {
     let rows: Vec<Value> = (collected.rows.iter().enumerate())
         .map(|(unit, row)| {
             let values: serde_json::Map<String, Value> = collected
@@ -135,7 +135,7 @@ fn json(collected: &Collected) -> Value {
     })
 }
 
-fn page(collected: &Collected) -> String {
+fn page(collected: &CollectedUnits) -> String {
     const STYLE: &str = ":root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1080px;margin:32px auto;padding:0 20px}table{border-collapse:collapse;font-variant-numeric:tabular-nums}th,td{padding:4px 10px;text-align:right;border-bottom:1px solid #e7eaef}svg{width:100%;height:auto}svg text{font:12px system-ui,sans-serif;fill:#1d2430}svg .grid{stroke:#e1e5ea;fill:none}div.wide{overflow-x:auto}";
     let [done, failed, missing] = collected.counts();
     let mut page = format!(
@@ -181,7 +181,7 @@ fn page(collected: &Collected) -> String {
     page
 }
 
-fn dot(collected: &Collected, unit: usize, names: &[String]) -> Option<Dot> {
+fn dot(collected: &CollectedUnits, unit: usize, names: &[String]) -> Option<Dot> {
     let row = &collected.rows[unit];
     Some(Dot {
         at: [*row.figures.get(&names[0])?, *row.figures.get(&names[1])?],
@@ -191,7 +191,7 @@ fn dot(collected: &Collected, unit: usize, names: &[String]) -> Option<Dot> {
     })
 }
 
-fn table(collected: &Collected, page: &mut String, title: &str, units: &[usize]) {
+fn table(collected: &CollectedUnits, page: &mut String, title: &str, units: &[usize]) {
     let _ = write!(
         page,
         "<h2>{title}</h2><div class=\"wide\"><table><tr><th>unit</th>"

@@ -10,13 +10,13 @@ use std::time::Instant;
 use anyhow::{Context as _, ensure};
 use clap::Args;
 
-use super::unit::Bench;
+use super::unit::Workbench;
 use crate::cli::out;
 use crate::cli::ranges::whole;
-use crate::io::study_folder::{Cost, StudyFolder};
+use crate::io::study_folder::{StudyFolder, UnitCost};
 use crate::parameter_study::Points;
 use crate::plain;
-use crate::varied::Base;
+use crate::varied::UnitBase;
 
 #[derive(Args, Debug, Clone)]
 pub struct RunArgs {
@@ -74,7 +74,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         "unit {last}: the study has {}, counted from 0",
         plain::count(units, "unit")
     );
-    let bench = Bench::new(&folder.study, &folder.home())?;
+    let bench = Workbench::new(&folder.study, &folder.home())?;
     ensure!(
         bench.base.fingerprint()? == folder.plan.base,
         "the base of the study has changed since it was planned: plan it anew into another folder"
@@ -97,7 +97,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
 }
 
 /// That the meshes of these units are those that the study was planned with.
-fn check_meshes(folder: &StudyFolder, base: &Base, units: &[usize]) -> anyhow::Result<()> {
+fn check_meshes(folder: &StudyFolder, base: &UnitBase, units: &[usize]) -> anyhow::Result<()> {
     if folder.plan.meshes.is_empty() {
         return Ok(());
     }
@@ -119,11 +119,11 @@ struct Crew<'a> {
     taken: AtomicUsize,
     stop: AtomicBool,
     failure: Mutex<Option<anyhow::Error>>,
-    progress: Mutex<Progress>,
+    progress: Mutex<UnitProgress>,
 }
 
 #[derive(Default)]
-struct Progress {
+struct UnitProgress {
     done: usize,
     failed: usize,
     shared: usize,
@@ -187,7 +187,7 @@ impl<'a> Crew<'a> {
     fn serve(&self, threads: usize) -> anyhow::Result<()> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.context("the worker threads could not be started; try --threads 1")?;
-        let mut bench = Bench::new(&self.folder.study, &self.folder.home())?;
+        let mut bench = Workbench::new(&self.folder.study, &self.folder.home())?;
         // Once: a Latin hypercube draws all of them.
         let points = Points::of(&self.folder.study).map_err(anyhow::Error::msg)?;
         let begun = Instant::now();
@@ -222,7 +222,7 @@ impl<'a> Crew<'a> {
         }
     }
 
-    fn tell(&self, cost: &Cost, error: Option<&str>, begun: Instant) {
+    fn tell(&self, cost: &UnitCost, error: Option<&str>, begun: Instant) {
         let Ok(mut progress) = self.progress.lock() else {
             return;
         };

@@ -9,7 +9,7 @@ use crate::cli::out;
 use crate::cli::ranges::whole;
 use crate::io::atomic;
 use crate::io::study_folder::StudyFolder;
-use crate::parameter_study::{Engine, Job};
+use crate::parameter_study::{Engine, UnitLimits};
 use crate::statistics::quantile;
 
 #[derive(Args, Debug, Clone)]
@@ -69,7 +69,7 @@ pub(super) fn run(args: &SubmitArgs) -> anyhow::Result<()> {
     let together = args
         .together
         .unwrap_or(folder.study.fastest().clamp(1, MOST_TOGETHER));
-    let job = Job {
+    let job = UnitLimits {
         units: folder.plan.units,
         together,
         minutes: args.minutes.unwrap_or_else(|| minutes(&folder, together)) as u32,

@@ -11,25 +11,25 @@ use crate::design::{self, DesignError, Simulated};
 use crate::document::{Document, SimulationInputs};
 use crate::io::cpu_seconds;
 use crate::io::project_file::LoadedProject;
-use crate::io::study_folder::{Cost, Outcome, StudyFolder, plain};
+use crate::io::study_folder::{StudyFolder, UnitCost, UnitOutcome, plain};
 use crate::mesh::TriMesh;
 use crate::parameter_study::{Figure, ParameterStudy, Points, figures};
-use crate::varied::Base;
+use crate::varied::UnitBase;
 
 /// What units are made on: the base, and the last simulation, which the next unit may share.
-pub struct Bench {
-    pub base: Base,
-    last: Option<Made>,
+pub struct Workbench {
+    pub base: UnitBase,
+    last: Option<MadeSimulation>,
 }
 
 /// A simulation with what it was made from.
-struct Made {
+struct MadeSimulation {
     inputs: SimulationInputs,
     part: Arc<TriMesh>,
     simulated: Arc<Simulated>,
 }
 
-impl Made {
+impl MadeSimulation {
     /// Whether it is of these inputs on this part: of another part the inputs say nothing.
     fn is_of(&self, inputs: &SimulationInputs, part: &TriMesh) -> bool {
         self.inputs == *inputs
@@ -38,14 +38,14 @@ impl Made {
     }
 }
 
-impl Bench {
+impl Workbench {
     /// For the units of a study whose paths start from a folder.
     ///
     /// # Errors
     /// Where the base is not there.
     pub fn new(study: &ParameterStudy, home: &Path) -> anyhow::Result<Self> {
         Ok(Self {
-            base: Base::new(study, home)?,
+            base: UnitBase::new(study, home)?,
             last: None,
         })
     }
@@ -60,13 +60,13 @@ impl Bench {
         unit: usize,
         beside: usize,
         watch: Watch,
-    ) -> anyhow::Result<(Outcome, Cost)> {
+    ) -> anyhow::Result<(UnitOutcome, UnitCost)> {
         let (cpu, start) = (cpu_seconds(), Instant::now());
         let study = &folder.study;
         let values = points.values(unit);
         let named = study.axes.iter().zip(&values);
         let plan = &folder.plan;
-        let mut outcome = Outcome {
+        let mut outcome = UnitOutcome {
             version: plan.version.clone(),
             study: plan.study.clone(),
             base: plan.base.clone(),
@@ -90,7 +90,7 @@ impl Bench {
                 Err(error) => outcome.error = Some(error.to_string()),
             },
         }
-        let cost = Cost {
+        let cost = UnitCost {
             unit,
             cpu_seconds: (cpu_seconds() - cpu) / beside as f64,
             seconds: start.elapsed().as_secs_f64(),
@@ -118,7 +118,7 @@ impl Bench {
             Some(made) => made.simulated,
             None => Arc::new(design::simulate(&inputs, &budget, watch)?),
         };
-        self.last = Some(Made {
+        self.last = Some(MadeSimulation {
             inputs: key,
             part,
             simulated: Arc::clone(&simulated),

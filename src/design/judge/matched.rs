@@ -21,10 +21,12 @@ use crate::design::{DesignError, Ground, Inputs, Simulated};
 use crate::draw::normal;
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
-use crate::evaluation::{Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest};
+use crate::evaluation::{
+    Candidate, Evaluation, Failures, Judging, JudgingForces, Matched, is_largest,
+};
 use crate::gauge::Gauge;
 use crate::inference::calibration::SAMPLES;
-use crate::inference::{AsDrawn, Deviations, Errors, KnownPress, Matching, calibrate};
+use crate::inference::{AsDrawn, Deviations, KnownPress, Matching, ReadingErrors, calibrate};
 use crate::mesh::TriMesh;
 use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
@@ -50,7 +52,7 @@ pub(in crate::design) struct ByMatching<'a> {
     pub reference: &'a Reference,
     /// Numbers of the streams of noise, one for each site of the reference.
     pub streams: &'a [u64],
-    pub forces: &'a Forces,
+    pub forces: &'a JudgingForces,
     pub budget: &'a Budget,
 }
 
@@ -92,7 +94,7 @@ impl ByMatching<'_> {
             work.solves += (MOVES * everywhere.rows.len()) as u64;
             for k in group {
                 report(watch, "Evaluating", k, sets.len())?;
-                let set = Set::new(self, &everywhere, &sets[k]);
+                let set = MatchedSet::new(self, &everywhere, &sets[k]);
                 if !is_largest(sets, k) {
                     found.push(set.found(middle, &[]));
                     continue;
@@ -217,7 +219,7 @@ fn groups(sets: &[Candidate]) -> Vec<Range<usize>> {
 }
 
 /// One set, and the estimators that its gauges are read with.
-struct Set<'a> {
+struct MatchedSet<'a> {
     trial: &'a ByMatching<'a>,
     candidate: &'a Candidate,
     /// Its channels among those that are known everywhere.
@@ -226,14 +228,14 @@ struct Set<'a> {
     built: Matching,
 }
 
-impl<'a> Set<'a> {
+impl<'a> MatchedSet<'a> {
     fn new(trial: &'a ByMatching<'a>, everywhere: &Everywhere, candidate: &'a Candidate) -> Self {
         let channel = |row: &usize| Some(vec![(everywhere.rows.binary_search(row).ok()?, 1.0)]);
         let channels: Vec<Vec<(usize, f64)>> = candidate.rows.iter().filter_map(channel).collect();
         let map = Arc::new(everywhere.drawn.map.mixed(&channels));
         let errors = |deviations: Option<&Deviations>| {
             let deviations = deviations.map(|d| d.mixed(&channels));
-            Errors::known(&trial.off(), channels.len(), deviations)
+            ReadingErrors::known(&trial.off(), channels.len(), deviations)
         };
         let exact = errors(everywhere.made.as_ref());
         let glued = errors(Some(&everywhere.deviations));
@@ -292,7 +294,7 @@ impl<'a> Set<'a> {
     fn calibrated_by(&self, drawn: &AsDrawn, known: &[KnownPress]) -> Matching {
         let (before, off) = (&self.built.errors, self.trial.off());
         let calibration = calibrate(drawn, known, &before.noise, &off);
-        let errors = Errors {
+        let errors = ReadingErrors {
             relative: calibration.relative,
             deviations: Some(drawn.deviations_of(&calibration.doubts, &off)),
             ..before.clone()

@@ -7,15 +7,15 @@ use glam::DVec3;
 use crate::budget::Watch;
 use crate::dataset::{Move, Site};
 use crate::design::filter::painted_sites;
-use crate::design::pressing::Pressing;
+use crate::design::pressing::JigFilter;
 use crate::design::{DesignError, Inputs, Simulated};
 use crate::elasticity::support::supported_vertices;
-use crate::feasible::{FeasibleInput, FeasibleRules, Surroundings, clearance, feasible_beside};
+use crate::feasible::{FeasibleInput, FeasibleRules, SiteSurroundings, clearance, feasible_beside};
 use crate::gauge::Gauge;
 use crate::mesh::SurfacePoint;
 
 /// Where gauges may be.
-pub(super) struct Room<'a> {
+pub(super) struct GaugeRoom<'a> {
     pub(super) inputs: &'a Inputs,
     pub(super) simulated: &'a Simulated,
     rules: FeasibleRules,
@@ -25,10 +25,10 @@ pub(super) struct Room<'a> {
     lattice: Vec<DVec3>,
     pub(super) spacing: f64,
     /// Where only what a jig gets to is asked for.
-    pressing: Option<Pressing>,
+    pressing: Option<JigFilter>,
 }
 
-impl<'a> Room<'a> {
+impl<'a> GaugeRoom<'a> {
     pub(super) fn new(inputs: &'a Inputs, simulated: &'a Simulated) -> Self {
         let sites = &simulated.dataset.sites[..simulated.lattice];
         let held = supported_vertices(&simulated.held);
@@ -37,7 +37,7 @@ impl<'a> Room<'a> {
             clearance: clearance(&simulated.mesh, &held),
             lattice: sites.iter().map(|site| site.gauge.position).collect(),
             spacing: inputs.project.sites.spacing(),
-            pressing: Pressing::of(inputs, simulated),
+            pressing: JigFilter::of(inputs, simulated),
             inputs,
             simulated,
         }
@@ -98,7 +98,7 @@ impl<'a> Room<'a> {
         &self,
         sites: &[Site],
         points: &[SurfacePoint],
-        surroundings: Option<&Surroundings>,
+        surroundings: Option<&SiteSurroundings>,
     ) -> Vec<bool> {
         let on = |mask: &Arc<Vec<bool>>| painted_sites(&self.inputs.part, mask, sites);
         let named = self.inputs.project.feasible.keep_out.as_ref();

@@ -13,9 +13,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::cut::{Cell, Cutter, Cutting, Moments};
+use super::cut::{Cell, CellCutter, CellMoments, Cutting};
 use super::elements::{Elements, ShapeFunctions, dissected};
-use super::grid::{Grid, Place};
+use super::grid::{CellGrid, CellIndex};
 use super::isotropic::isotropic;
 use super::lagrange::{Lagrange, gauss};
 use crate::budget::{Cancelled, Watch, report};
@@ -25,14 +25,14 @@ use crate::mesh::stance::Stance;
 
 /// The cells of a part.
 pub struct FiniteCells {
-    grid: Grid,
+    grid: CellGrid,
     /// Along which the grid stands: coordinates in it are those of this.
     stance: Stance,
     shapes: Lagrange,
     /// Where the cells with material lie, rising, and what they hold.
-    places: Vec<Place>,
-    moments: Vec<Moments>,
-    number: FxHashMap<Place, u32>,
+    places: Vec<CellIndex>,
+    moments: Vec<CellMoments>,
+    number: FxHashMap<CellIndex, u32>,
     /// Nodes of each cell, as many as it has shape functions.
     nodes: Vec<u32>,
     /// Where the nodes lie (m).
@@ -58,7 +58,7 @@ impl FiniteCells {
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn new(
-        grid: Grid,
+        grid: CellGrid,
         stance: Stance,
         order: usize,
         surface: &SignedDistance,
@@ -67,15 +67,15 @@ impl FiniteCells {
     ) -> Result<Self, Cancelled> {
         let shapes = Lagrange::new(order);
         let candidates = near_material(&grid, stance, surface);
-        let cutter = Cutter::new(surface, stance, cutting, order);
-        let mut cells: Vec<(Place, Moments)> = Vec::with_capacity(candidates.len());
+        let cutter = CellCutter::new(surface, stance, cutting, order);
+        let mut cells: Vec<(CellIndex, CellMoments)> = Vec::with_capacity(candidates.len());
         for (done, chunk) in candidates.chunks(CHUNK).enumerate() {
             report(watch, "Cutting cells", done * CHUNK, candidates.len())?;
             let cut: Vec<_> = chunk
                 .par_iter()
                 .map(|&(place, whole)| {
                     let moments = if whole {
-                        Moments::full(2 * order + 1)
+                        CellMoments::full(2 * order + 1)
                     } else {
                         cutter.moments(&grid.cell(place))
                     };
@@ -84,7 +84,7 @@ impl FiniteCells {
                 .collect();
             cells.extend(cut.into_iter().filter(|(_, m)| m.share() > LEAST_SHARE));
         }
-        let (places, moments): (Vec<Place>, Vec<Moments>) = cells.into_iter().unzip();
+        let (places, moments): (Vec<CellIndex>, Vec<CellMoments>) = cells.into_iter().unzip();
         let (nodes, lattice) = number_nodes(&places, order as u32);
         let positions = lattice
             .iter()
@@ -289,7 +289,11 @@ fn gradients(shapes: &Lagrange) -> Mat<f64> {
 
 /// Cells that may hold material, rising, and whether they are full of it: blocks of cells that the surface does not
 /// reach are taken or left as one.
-fn near_material(grid: &Grid, stance: Stance, surface: &SignedDistance) -> Vec<(Place, bool)> {
+fn near_material(
+    grid: &CellGrid,
+    stance: Stance,
+    surface: &SignedDistance,
+) -> Vec<(CellIndex, bool)> {
     let mut found = Vec::new();
     let mut blocks = vec![([0; 3], grid.counts())];
     while let Some((from, to)) = blocks.pop() {
@@ -321,7 +325,7 @@ fn near_material(grid: &Grid, stance: Stance, surface: &SignedDistance) -> Vec<(
 }
 
 /// Nodes of every cell, and the lattice places of all nodes.
-fn number_nodes(cells: &[Place], order: u32) -> (Vec<u32>, Vec<[u32; 3]>) {
+fn number_nodes(cells: &[CellIndex], order: u32) -> (Vec<u32>, Vec<[u32; 3]>) {
     let mut known: FxHashMap<[u32; 3], u32> = FxHashMap::default();
     let mut lattice = Vec::new();
     let mut nodes = Vec::new();
@@ -346,10 +350,10 @@ fn number_nodes(cells: &[Place], order: u32) -> (Vec<u32>, Vec<[u32; 3]>) {
     (nodes, lattice)
 }
 
-fn node_position(grid: &Grid, shapes: &Lagrange, at: [u32; 3]) -> DVec3 {
+fn node_position(grid: &CellGrid, shapes: &Lagrange, at: [u32; 3]) -> DVec3 {
     let order = shapes.order() as u32;
     let counts = grid.counts();
-    let cell: Place = std::array::from_fn(|i| (at[i] / order).min(counts[i] - 1));
+    let cell: CellIndex = std::array::from_fn(|i| (at[i] / order).min(counts[i] - 1));
     let within: [f64; 3] =
         std::array::from_fn(|i| shapes.points()[(at[i] - cell[i] * order) as usize]);
     let cell = grid.cell(cell);

@@ -53,14 +53,14 @@ pub struct Cutting {
 /// Integrals over the material of a cell of Pᵢ(ξ) Pⱼ(η) Pₖ(ζ), divided by an eighth of the cell's volume:
 /// number i + n (j + n k) for degrees below n.
 #[derive(Clone, Debug)]
-pub struct Moments {
+pub struct CellMoments {
     /// n: one more than the highest degree along each axis.
     pub degrees: usize,
     /// n³ integrals.
     pub values: Vec<f64>,
 }
 
-impl Moments {
+impl CellMoments {
     fn none(degrees: usize) -> Self {
         Self {
             degrees,
@@ -158,14 +158,14 @@ fn product<const N: usize>(
 }
 
 /// Rules on a tetrahedron with corners 0, x, y, z of the unit kind, by points a side.
-struct Rules {
+struct CutRules {
     /// Along a side of a box.
     line: Vec<(f64, f64)>,
     /// By depth: coarser where the pieces are small.
     tetrahedra: Vec<Vec<(DVec3, f64)>>,
 }
 
-impl Rules {
+impl CutRules {
     fn new(order: usize) -> Self {
         let mut tetrahedra: Vec<_> = [order + 2, order + 1].map(conical).into();
         tetrahedra.push(QUADRATIC.map(|p| (DVec3::from_array(p), 1.0 / 24.0)).into());
@@ -208,16 +208,16 @@ fn conical(n: usize) -> Vec<(DVec3, f64)> {
 }
 
 /// Cuts cells for shape functions of one order.
-pub struct Cutter<'s> {
+pub struct CellCutter<'s> {
     surface: &'s SignedDistance,
     /// Along which cells stand.
     stance: Stance,
     cutting: Cutting,
-    rules: Rules,
+    rules: CutRules,
     degrees: usize,
 }
 
-impl<'s> Cutter<'s> {
+impl<'s> CellCutter<'s> {
     /// For elements of this order that stand so, cut by this surface.
     #[must_use]
     pub fn new(
@@ -230,19 +230,19 @@ impl<'s> Cutter<'s> {
             surface,
             stance,
             cutting,
-            rules: Rules::new(order),
+            rules: CutRules::new(order),
             degrees: 2 * order + 1,
         }
     }
 
     /// The moments of a cell's material.
     #[must_use]
-    pub fn moments(&self, cell: &Cell) -> Moments {
-        let mut work = Work {
+    pub fn moments(&self, cell: &Cell) -> CellMoments {
+        let mut work = CutCell {
             cutter: self,
             cell,
             known: FxHashMap::default(),
-            moments: Moments::none(self.degrees),
+            moments: CellMoments::none(self.degrees),
         };
         work.visit([0; 3], 0, None);
         work.moments
@@ -250,11 +250,11 @@ impl<'s> Cutter<'s> {
 }
 
 /// A cell under the knife. Places are lattice numbers: halves of the smallest box.
-struct Work<'c> {
-    cutter: &'c Cutter<'c>,
+struct CutCell<'c> {
+    cutter: &'c CellCutter<'c>,
     cell: &'c Cell,
     known: FxHashMap<[u32; 3], f64>,
-    moments: Moments,
+    moments: CellMoments,
 }
 
 /// Corners of a box in halves of its sides, and the middles of its faces with their corners.
@@ -287,7 +287,7 @@ const TETRAHEDRA: [[usize; 4]; 6] = [
     [0, 4, 6, 7],
 ];
 
-impl Work<'_> {
+impl CutCell<'_> {
     fn finest(&self) -> u32 {
         2 << self.cutter.cutting.depth
     }
@@ -386,7 +386,7 @@ impl Work<'_> {
         let from = self.local(lower);
         let half = f64::from(side) / f64::from(self.finest());
         if side == self.finest() {
-            self.moments = Moments::full(cutter.degrees);
+            self.moments = CellMoments::full(cutter.degrees);
             return;
         }
         // A product of integrals along the three sides.

@@ -5,18 +5,18 @@ use glam::DVec3;
 use super::cut::Cell;
 
 /// The number of a cell, or of a corner, along the three axes.
-pub type Place = [u32; 3];
+pub type CellIndex = [u32; 3];
 
 /// Planes along x, y and z (m), rising.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Grid {
+pub struct CellGrid {
     planes: [Vec<f64>; 3],
 }
 
 /// Wanted planes nearer to each other than this share of a cell are one.
 const TOGETHER: f64 = 1e-3;
 
-impl Grid {
+impl CellGrid {
     /// Cells of at most `size` (m) around a part, with planes where they are `wanted` (m, by axis) inside of it.
     #[must_use]
     pub fn new(bounds: (DVec3, DVec3), size: f64, wanted: &[Vec<f64>; 3]) -> Self {
@@ -44,7 +44,7 @@ impl Grid {
 
     /// Cells along each axis.
     #[must_use]
-    pub fn counts(&self) -> Place {
+    pub fn counts(&self) -> CellIndex {
         std::array::from_fn(|axis| self.planes[axis].len() as u32 - 1)
     }
 
@@ -57,14 +57,14 @@ impl Grid {
 
     /// The box of a cell.
     #[must_use]
-    pub fn cell(&self, at: Place) -> Cell {
+    pub fn cell(&self, at: CellIndex) -> Cell {
         self.span(at, at.map(|i| i + 1))
     }
 
     /// The box from the lower corner of one cell to that of another.
     #[must_use]
-    pub fn span(&self, from: Place, to: Place) -> Cell {
-        let corner = |at: Place| {
+    pub fn span(&self, from: CellIndex, to: CellIndex) -> Cell {
+        let corner = |at: CellIndex| {
             let side = |axis: usize| self.planes[axis][at[axis] as usize];
             DVec3::new(side(0), side(1), side(2))
         };
@@ -77,7 +77,7 @@ impl Grid {
 
     /// The cell that a point lies in; one beside the grid belongs to the last cell.
     #[must_use]
-    pub fn place(&self, point: DVec3) -> Place {
+    pub fn place(&self, point: DVec3) -> CellIndex {
         std::array::from_fn(|axis| {
             let planes = &self.planes[axis];
             let beyond = planes.partition_point(|&p| p <= point[axis]);
@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn planes_lie_where_they_are_wanted() {
         let wanted = [vec![0.25, 7.0], vec![], vec![0.5, 0.5 + 1e-9]];
-        let grid = Grid::new((DVec3::ZERO, DVec3::ONE), 0.3, &wanted);
+        let grid = CellGrid::new((DVec3::ZERO, DVec3::ONE), 0.3, &wanted);
         assert!(grid.planes[0].contains(&0.25) && !grid.planes[0].contains(&7.0));
         assert_eq!(
             grid.planes[2]

@@ -31,7 +31,7 @@ use crate::mesh::reach::{FINGERTIP, Reach};
 use crate::mesh::remesh::remesh;
 use crate::mesh::room::Room;
 use crate::mesh::surface::Surface;
-use crate::mesh::walls::{Side, Walls};
+use crate::mesh::walls::{WallSide, Walls};
 use crate::mesh::{SurfacePoint, TriMesh, components};
 
 /// The part and its supports as if its file had numbered it in an order of its own; tetrahedra that came with it keep
@@ -82,7 +82,7 @@ impl SolidGround {
         part: &Arc<TriMesh>,
         material: Material,
         supports: &[Support],
-        declared: &dyn Fn(DVec3) -> Option<Side>,
+        declared: &dyn Fn(DVec3) -> Option<WallSide>,
         watch: Watch,
     ) -> Result<Self, ElasticError> {
         Self::touched_by(FINGERTIP, part, material, supports, declared, watch)
@@ -97,7 +97,7 @@ impl SolidGround {
         part: &Arc<TriMesh>,
         material: Material,
         supports: &[Support],
-        declared: &dyn Fn(DVec3) -> Option<Side>,
+        declared: &dyn Fn(DVec3) -> Option<WallSide>,
         watch: Watch,
     ) -> Result<Self, ElasticError> {
         report(watch, "Measuring walls", 0, 1)?;
@@ -120,7 +120,7 @@ impl SolidGround {
                 reach.tell(t, side);
             }
         }
-        let inward: Vec<bool> = walls.sides.iter().map(|&s| s == Side::Inside).collect();
+        let inward: Vec<bool> = walls.sides.iter().map(|&s| s == WallSide::Inside).collect();
         let (inside, vertices) = whole
             .part_of(|t| inward[t as usize])
             .ok_or(ElasticError::NoFace { face: "inside" })?;
@@ -194,7 +194,7 @@ impl SolidGround {
         let index = self.whole.index();
         let outside = remeshed.part_of(|t| {
             let middle = remeshed.corners(t).iter().sum::<DVec3>() / 3.0;
-            self.walls.sides[index.nearest(middle).0.triangle as usize] == Side::Outside
+            self.walls.sides[index.nearest(middle).0.triangle as usize] == WallSide::Outside
         });
         outside.map_or_else(|| Arc::clone(&self.outside), |(mesh, _)| Arc::new(mesh))
     }

@@ -7,10 +7,10 @@ use glam::DVec3;
 use super::cells::FiniteCells;
 use super::cut::Cutting;
 use super::dissection::Dissection;
-use super::grid::Grid;
+use super::grid::CellGrid;
 use super::grip::Grip;
-use super::piece::Piece;
-use super::tetrahedra::Tetrahedra;
+use super::piece::TetrahedraPiece;
+use super::tetrahedra::OrderedTetrahedra;
 use super::{Elements, SolidModel};
 use crate::bounds::Bounds;
 use crate::budget::Watch;
@@ -131,7 +131,7 @@ impl Immersed {
         let mesh = &self.held.mesh;
         let places = mesh.positions().iter().map(|&p| stance.coordinates(p));
         let Bounds { lower, upper } = Bounds::around(places);
-        let grid = Grid::new((lower, upper), fineness.size, &planes);
+        let grid = CellGrid::new((lower, upper), fineness.size, &planes);
         let cutting = Cutting {
             tolerance: fineness.tolerance * fineness.size,
             depth: fineness.depth(),
@@ -203,16 +203,16 @@ impl Immersed {
 
     /// The part's own tetrahedra, halved as often as `fineness` says, with displacements of its order.
     #[must_use]
-    pub fn tetrahedra(&self, fineness: &Fineness) -> Option<Tetrahedra> {
+    pub fn tetrahedra(&self, fineness: &Fineness) -> Option<OrderedTetrahedra> {
         let mut mesh = Arc::clone(self.part.volume()?);
         if fineness.halvings == 0 {
-            let elements = Tetrahedra::dissected(&mesh, fineness.order, &self.dissection);
+            let elements = OrderedTetrahedra::dissected(&mesh, fineness.order, &self.dissection);
             return Some(elements);
         }
         for _ in 0..fineness.halvings {
             mesh = Arc::new(mesh.refined());
         }
-        Some(Tetrahedra::new(&mesh, fineness.order))
+        Some(OrderedTetrahedra::new(&mesh, fineness.order))
     }
 
     /// The model on the part's own tetrahedra.
@@ -222,7 +222,7 @@ impl Immersed {
     pub fn on_own(
         &self,
         surface: &Arc<TriMesh>,
-        elements: Tetrahedra,
+        elements: OrderedTetrahedra,
         fineness: &Fineness,
         watch: Watch,
     ) -> Result<SolidModel, ElasticError> {
@@ -243,11 +243,11 @@ impl Immersed {
     pub fn on_piece(
         &self,
         surface: &Arc<TriMesh>,
-        piece: &Piece,
+        piece: &TetrahedraPiece,
         fineness: &Fineness,
         watch: Watch,
     ) -> Result<SolidModel, ElasticError> {
-        let elements = Tetrahedra::new(&piece.mesh, fineness.order);
+        let elements = OrderedTetrahedra::new(&piece.mesh, fineness.order);
         let mut grip = Grip::new(&elements);
         for node in elements.nodes_on(&piece.cut) {
             grip.nodes[node as usize].0 |= DofSet::DISPLACEMENTS.0;
@@ -380,7 +380,7 @@ fn along_planes(support: &Support, stance: Stance) -> Option<(DVec3, DVec3)> {
 /// Holds the nodes in a support's box; whether there are any.
 fn hold_box(
     grip: &mut Grip,
-    elements: &Tetrahedra,
+    elements: &OrderedTetrahedra,
     support: &Support,
     fineness: &Fineness,
 ) -> bool {

@@ -11,7 +11,7 @@ use crate::mesh::volume::VolumeMesh;
 const TETRAHEDRA: usize = 2500;
 
 /// Some of a mesh's tetrahedra.
-pub struct Piece {
+pub struct TetrahedraPiece {
     /// These tetrahedra as a mesh of their own (m).
     pub mesh: Arc<VolumeMesh>,
     /// The faces it was cut along, by their corners in rising order.
@@ -21,7 +21,7 @@ pub struct Piece {
     radius: f64,
 }
 
-impl Piece {
+impl TetrahedraPiece {
     /// The tetrahedra that are nearest to a place (m).
     #[must_use]
     pub fn around(whole: &VolumeMesh, centre: DVec3) -> Self {

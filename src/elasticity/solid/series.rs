@@ -9,13 +9,13 @@
 const LATEST: usize = 4;
 
 /// The fit through one quantity, the same for all quantities on the same grids.
-pub struct Series {
+pub struct GridSeries {
     /// The first grid that takes part, and hᵖ over that of the last from there on.
     first: usize,
     powers: Vec<f64>,
 }
 
-impl Series {
+impl GridSeries {
     /// Of grids of these sizes (at least two, falling), with errors that fall as their power `order`.
     #[must_use]
     pub fn new(sizes: &[f64], order: f64) -> Self {
@@ -67,7 +67,7 @@ mod tests {
         let sizes = [8.0, 5.0, 3.0, 2.0];
         for count in 2..=4 {
             let sizes = &sizes[..count];
-            let series = Series::new(sizes, 2.0);
+            let series = GridSeries::new(sizes, 2.0);
             let (off, scatter) = series.left(|k| 7.0 - 0.3 * sizes[k].powi(2));
             let truth = -0.3 * sizes[count - 1].powi(2);
             assert!((off - truth).abs() < 1e-12 && scatter < 1e-12);
@@ -78,10 +78,10 @@ mod tests {
     fn two_grids_that_agree_do_not_hide_what_a_third_shows() {
         // A channel with walls of 3 mm (% of the truth): the last two grids agree to half a percent.
         let (sizes, found) = ([8.0, 5.0, 3.33, 2.22], [-22.2, -8.63, -2.08, -2.66]);
-        let series = Series::new(&sizes, 2.0);
+        let series = GridSeries::new(&sizes, 2.0);
         let error = series.error(|k| found[k]);
         assert!((1.3..5.3).contains(&error), "{error}");
-        let two = Series::new(&sizes[2..], 2.0);
+        let two = GridSeries::new(&sizes[2..], 2.0);
         assert!(two.error(|k| found[2 + k]) < 0.5);
     }
 }

@@ -17,18 +17,18 @@ use super::isotropic::isotropic;
 use super::simplex::Simplex;
 use super::{Elements, ShapeFunctions, neighbours};
 use crate::elasticity::Material;
-use crate::elasticity::solver::Plan;
+use crate::elasticity::solver::FactorPlan;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::volume::{FacePlace, VolumeMesh, jacobian, shapes};
 
 /// Elements of one order on the user's tetrahedra.
-pub struct Tetrahedra {
+pub struct OrderedTetrahedra {
     mesh: Arc<VolumeMesh>,
     simplex: Simplex,
     /// Where the nodes of the displacements lie (m), and which ones every tetrahedron has, one after the other.
     nodes: Vec<DVec3>,
     numbers: Vec<u32>,
-    rule: Vec<Point>,
+    rule: Vec<RulePoint>,
     /// Finds the triangle of the surface that a point lies on.
     index: SurfaceIndex,
     /// For each of those its element and the places of its corners in it.
@@ -37,11 +37,11 @@ pub struct Tetrahedra {
     grain: f64,
     /// Of the mesh, for all orders.
     dissection: Arc<OnceLock<Dissection>>,
-    plan: OnceLock<Option<Plan>>,
+    plan: OnceLock<Option<FactorPlan>>,
 }
 
 /// A point of the rule, with the gradients of the displacements' shape functions there.
-struct Point {
+struct RulePoint {
     at: DVec3,
     weight: f64,
     gradients: Vec<DVec3>,
@@ -107,7 +107,7 @@ fn nets(mesh: &VolumeMesh) -> Vec<Net> {
     nets
 }
 
-impl Tetrahedra {
+impl OrderedTetrahedra {
     /// Of an order between 1 and [`super::simplex::HIGHEST`].
     #[must_use]
     pub fn new(mesh: &Arc<VolumeMesh>, order: usize) -> Self {
@@ -124,7 +124,7 @@ impl Tetrahedra {
         let (triangles, places) = mesh.surface_places();
         let simplex = Simplex::new(order);
         let (nodes, numbers) = numbered(mesh, &simplex);
-        let point = |(at, weight)| Point {
+        let point = |(at, weight)| RulePoint {
             at,
             weight,
             gradients: simplex.at(at).into_iter().map(|(_, g)| g).collect(),
@@ -145,8 +145,8 @@ impl Tetrahedra {
 
     /// What the factor of their stiffness will be; nothing where not even that fits into memory.
     #[must_use]
-    pub fn plan(&self) -> Option<&Plan> {
-        let found = || Plan::new(&neighbours(self), &self.dissect(), 3).ok();
+    pub fn plan(&self) -> Option<&FactorPlan> {
+        let found = || FactorPlan::new(&neighbours(self), &self.dissect(), 3).ok();
         self.plan.get_or_init(found).as_ref()
     }
 
@@ -211,7 +211,7 @@ impl Tetrahedra {
     }
 }
 
-impl Elements for Tetrahedra {
+impl Elements for OrderedTetrahedra {
     fn nodes(&self) -> &[DVec3] {
         &self.nodes
     }
@@ -290,14 +290,14 @@ mod tests {
     #[test]
     fn neighbours_share_the_nodes_between_them_at_any_order() {
         for order in 1..=5 {
-            let elements = Tetrahedra::new(&pair(), order);
+            let elements = OrderedTetrahedra::new(&pair(), order);
             let each = Simplex::count(order);
             let shared = (order + 1) * (order + 2) / 2;
             assert_eq!(elements.nodes().len(), 2 * each - shared, "{order}");
         }
         // Of order 2 they are the mesh's own.
         let mesh = pair();
-        let elements = Tetrahedra::new(&mesh, 2);
+        let elements = OrderedTetrahedra::new(&mesh, 2);
         let known = |p: &DVec3| mesh.nodes.iter().any(|q| q.distance(*p) < 1e-15);
         assert!(elements.nodes().iter().all(known));
         assert_eq!(elements.nodes_of(0).len(), 10);
@@ -311,7 +311,7 @@ mod tests {
         };
         let (lambda, mu) = material.lame();
         for order in 2..=5 {
-            let elements = Tetrahedra::new(&pair(), order);
+            let elements = OrderedTetrahedra::new(&pair(), order);
             let energy = |field: &dyn Fn(DVec3) -> DVec3| -> (f64, f64) {
                 let mut energy = 0.0;
                 let mut volume = 0.0;

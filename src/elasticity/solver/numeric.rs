@@ -45,7 +45,7 @@ pub(super) fn factorize(
         waiting: vec![Vec::new(); count],
         local: vec![0; supernode.len()],
     };
-    let mut meter = Meter::new(symbolic, watch);
+    let mut meter = FactorMeter::new(symbolic, watch);
     for s in 0..count {
         // Not all at once: a large piece of new memory is slow to come.
         values.resize(starts[s + 1], 0.0);
@@ -187,7 +187,7 @@ fn dense(
     front: &mut [f64],
     height: usize,
     width: usize,
-    meter: &mut Meter,
+    meter: &mut FactorMeter,
 ) -> Result<(), FactorError> {
     let scratch = cholesky_in_place_scratch::<f64>(PANEL, Par::Seq, Spec::default());
     let mut memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::OutOfMemory)?;
@@ -263,20 +263,20 @@ pub(super) fn multiplications(symbolic: &SymbolicSupernodalCholesky<usize>) -> f
     let cost = |s: usize| {
         let node = symbolic.supernode(s);
         let width = symbolic.supernode_end()[s] - node.start();
-        Meter::cost(width + node.pattern().len(), width)
+        FactorMeter::cost(width + node.pattern().len(), width)
     };
     (0..symbolic.n_supernodes()).map(cost).sum()
 }
 
 /// How far the factor is, by its multiplications.
-struct Meter<'a> {
+struct FactorMeter<'a> {
     watch: Watch<'a>,
     total: f64,
     done: f64,
     said: usize,
 }
 
-impl<'a> Meter<'a> {
+impl<'a> FactorMeter<'a> {
     fn new(symbolic: &SymbolicSupernodalCholesky<usize>, watch: Watch<'a>) -> Self {
         Self {
             watch,

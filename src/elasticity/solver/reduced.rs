@@ -17,7 +17,7 @@ const TOGETHER: u32 = 128;
 
 /// One block of them.
 #[derive(Default)]
-pub struct Reduced {
+pub struct ReducedBlock {
     /// The supernodes below the cut that are reached, rising, and the row here at which the rows of each begin.
     nodes: Vec<u32>,
     pub(super) starts: Vec<usize>,
@@ -29,7 +29,7 @@ pub struct Reduced {
 
 /// What a thread keeps between blocks.
 #[derive(Default)]
-pub struct Scratch {
+pub struct SolveScratch {
     /// By supernode below the cut, the row at which its rows begin in a block that reaches it.
     pub(super) starts: Vec<u32>,
     /// By row above, where it stands in a block that leaves something there.
@@ -37,8 +37,8 @@ pub struct Scratch {
     pub(super) below: Vec<f64>,
 }
 
-impl Scratch {
-    pub(super) fn lay_out(&mut self, (nodes, rows): (usize, usize), block: &Reduced) {
+impl SolveScratch {
+    pub(super) fn lay_out(&mut self, (nodes, rows): (usize, usize), block: &ReducedBlock) {
         self.starts.resize(nodes, 0);
         self.places.resize(rows, 0);
         for (&node, &start) in block.nodes.iter().zip(&block.starts) {
@@ -50,7 +50,7 @@ impl Scratch {
     }
 }
 
-impl Reduced {
+impl ReducedBlock {
     /// Makes room for supernodes with so many rows each, and for rows above, all zero.
     pub(super) fn lay_out(&mut self, nodes: &[u32], above: &[u32], rows: impl Fn(u32) -> usize) {
         self.nodes.clear();
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     /// Of rows above, each with values of its own.
-    fn above(rows: &[u32], empty: &[u32]) -> Reduced {
+    fn above(rows: &[u32], empty: &[u32]) -> ReducedBlock {
         let of = |row: &u32| -> [f64; BLOCK] {
             let is_empty = empty.contains(row);
             std::array::from_fn(|k| {
@@ -163,7 +163,7 @@ mod tests {
                 }
             })
         };
-        Reduced {
+        ReducedBlock {
             nodes: Vec::new(),
             starts: vec![0],
             above: rows.to_vec(),
@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn rows_that_only_others_reach_change_no_bit() {
         let solved: Vec<f64> = (0..400 * BLOCK).map(|k| (0.7 * k as f64).cos()).collect();
-        let read = |block: &Reduced| {
+        let read = |block: &ReducedBlock| {
             let mut into = vec![0.0; BLOCK * BLOCK];
             block.read((&solved, &[]), |_| 0, &mut Vec::new(), &mut into);
             into.into_iter().map(f64::to_bits).collect::<Vec<_>>()

@@ -2,7 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::{Calibration, Errors, KnownPress, Least, PER_GAUGE, Press, noise_of_mean};
+use super::{
+    Calibration, ComparedPress, KnownPress, Least, PER_GAUGE, ReadingErrors, noise_of_mean,
+};
 use crate::inference::drawn::AsDrawn;
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::Uncertainty;
@@ -49,10 +51,10 @@ fn misfit(
     }
     let fitted = super::fitted(drawn, &others.iter().collect::<Vec<_>>(), noise, off);
     let (fit, relative) = (fitted.fit?, fitted.relative);
-    let press = Press::new(drawn, press, &fitted.glued, off);
-    let errors = Errors {
+    let press = ComparedPress::new(drawn, press, &fitted.glued, off);
+    let errors = ReadingErrors {
         relative,
-        ..Errors::of_noises(noise)
+        ..ReadingErrors::of_noises(noise)
     };
     let basis = basis(&press);
     let foreseen = press.expected() + &basis * &fit.found;
@@ -70,7 +72,7 @@ fn misfit(
 }
 
 /// What each unknown says of each channel of a press: channels × unknowns.
-fn basis(press: &Press) -> DMatrix<f64> {
+fn basis(press: &ComparedPress) -> DMatrix<f64> {
     let channels = press.basis.len();
     let mut basis = DMatrix::zeros(channels, PER_GAUGE * channels + 1);
     for c in 0..channels {
@@ -83,7 +85,7 @@ fn basis(press: &Press) -> DMatrix<f64> {
 
 /// What is not known of readings yet, and what more presses would leave of that.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outlook {
+pub struct PressOutlook {
     /// Standard deviation of a reading by what is not known of the gauges, over the reading (rms over the part): as it is,
     /// and after each press more.
     pub doubts: Vec<f64>,
@@ -91,7 +93,7 @@ pub struct Outlook {
     pub places: Vec<SurfacePoint>,
 }
 
-impl Outlook {
+impl PressOutlook {
     /// How many more presses are worth the trouble.
     #[must_use]
     pub fn worth(&self) -> usize {
@@ -109,29 +111,29 @@ pub fn outlook(
     (noise, off): (&[f64], &Uncertainty),
     places: &[SurfacePoint],
     force: f64,
-) -> Outlook {
+) -> PressOutlook {
     let noise = &noise_of_mean(noise);
-    let errors = Errors {
+    let errors = ReadingErrors {
         relative: calibration.relative,
-        ..Errors::of_noises(noise)
+        ..ReadingErrors::of_noises(noise)
     };
     let made = |at: SurfacePoint, force: f64| {
         let reading: Vec<f64> = drawn.slope(at, &calibration.glued).reading;
         let reading = reading.iter().map(|g| force * g).collect();
         let known = KnownPress { at, force, reading };
-        Press::new(drawn, &known, &calibration.glued, off)
+        ComparedPress::new(drawn, &known, &calibration.glued, off)
     };
     let share = places.len().div_ceil(PLACES).max(1);
     let candidates: Vec<SurfacePoint> = places.iter().copied().step_by(share).collect();
-    let presses: Vec<Press> = candidates.iter().map(|&at| made(at, force)).collect();
+    let presses: Vec<ComparedPress> = candidates.iter().map(|&at| made(at, force)).collect();
     let of_readings: Vec<DMatrix<f64>> = presses.iter().map(basis).collect();
     let information: Vec<Option<DMatrix<f64>>> = presses
         .iter()
         .zip(&of_readings)
         .map(|(press, basis)| tells(press, basis, &errors, off.drift))
         .collect();
-    let past: Vec<Press> = (known.iter())
-        .map(|k| Press::new(drawn, k, &calibration.glued, off))
+    let past: Vec<ComparedPress> = (known.iter())
+        .map(|k| ComparedPress::new(drawn, k, &calibration.glued, off))
         .collect();
     let least = Least {
         presses: &past,
@@ -147,7 +149,7 @@ pub fn outlook(
         let factor = normal.clone().cholesky();
         factor.map_or(f64::INFINITY, |f| doubt_of(&f, &presses, &of_readings))
     };
-    let mut outlook = Outlook {
+    let mut outlook = PressOutlook {
         doubts: vec![doubt(&normal)],
         places: Vec::new(),
     };
@@ -169,14 +171,19 @@ pub fn outlook(
 }
 
 /// What a press says of the unknowns: Bᵀ V⁻¹ B.
-fn tells(press: &Press, basis: &DMatrix<f64>, errors: &Errors, drift: f64) -> Option<DMatrix<f64>> {
+fn tells(
+    press: &ComparedPress,
+    basis: &DMatrix<f64>,
+    errors: &ReadingErrors,
+    drift: f64,
+) -> Option<DMatrix<f64>> {
     let covariance = press.covariance(errors, drift)?;
     Some(basis.tr_mul(&covariance.solve(basis)))
 }
 
 /// Standard deviation of readings by what is not known, over the readings: rms over places.
-fn doubt_of(normal: &Cholesky<f64, Dyn>, presses: &[Press], bases: &[DMatrix<f64>]) -> f64 {
-    let of_place = |(press, basis): (&Press, &DMatrix<f64>)| {
+fn doubt_of(normal: &Cholesky<f64, Dyn>, presses: &[ComparedPress], bases: &[DMatrix<f64>]) -> f64 {
+    let of_place = |(press, basis): (&ComparedPress, &DMatrix<f64>)| {
         let reading: f64 = press.reading.iter().map(|x| x * x).sum();
         let solved = normal.solve(&basis.transpose());
         (basis * solved).trace() / reading.max(f64::MIN_POSITIVE)

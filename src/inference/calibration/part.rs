@@ -13,7 +13,8 @@
 use nalgebra::{Cholesky, Dyn};
 
 use super::{
-    BEFORE, Errors, Fitted, KnownPress, LEAST, Least, Press, fitted, noise_of_mean, sound,
+    BEFORE, ComparedPress, Fitted, KnownPress, LEAST, Least, ReadingErrors, fitted, noise_of_mean,
+    sound,
 };
 use crate::inference::drawn::AsDrawn;
 use crate::uncertainty::Uncertainty;
@@ -44,17 +45,17 @@ pub fn of_part(
         fit,
     } = fitted(drawn, &known, noise, off);
     let fit = fit?;
-    let presses: Vec<Press> = (known.iter())
-        .map(|k| Press::new(drawn, k, &glued, off))
+    let presses: Vec<ComparedPress> = (known.iter())
+        .map(|k| ComparedPress::new(drawn, k, &glued, off))
         .collect();
     let least = Least {
         presses: &presses,
         noise,
         off,
     };
-    let errors = Errors {
+    let errors = ReadingErrors {
         relative,
-        ..Errors::of_noises(noise)
+        ..ReadingErrors::of_noises(noise)
     };
     let mut spread = log_determinant(&fit.normal);
     for press in &presses {

@@ -8,7 +8,7 @@ use super::*;
 use crate::draw::normal;
 use crate::inference::ResponseMap;
 use crate::mesh::TriMesh;
-use crate::uncertainty::{Gluing, Making, Pressing};
+use crate::uncertainty::{Gluing, HandPressing, Making};
 
 const CHANNELS: usize = 5;
 const NOISE: [f64; CHANNELS] = [1e-6; CHANNELS];
@@ -63,7 +63,7 @@ fn built(gluing: &Gluing, rng: &mut ChaCha8Rng) -> Vec<AsGlued> {
 }
 
 /// A press of gauges as built, as it is taken to be.
-fn press(real: &ResponseMap, pressing: &Pressing, rng: &mut ChaCha8Rng) -> KnownPress {
+fn press(real: &ResponseMap, pressing: &HandPressing, rng: &mut ChaCha8Rng) -> KnownPress {
     let at = somewhere(rng);
     let beside = pressing.place / 2.0_f64.sqrt();
     let moved = DVec3::X * (beside * normal(rng)) + DVec3::Y * (beside * normal(rng));
@@ -87,8 +87,8 @@ fn what_is_integrated_out_is_what_would_be_solved_for() {
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
     let glued = [AsGlued::DRAWN; CHANNELS];
-    let presses: Vec<Press> = (known.iter())
-        .map(|k| Press::new(&drawn, k, &glued, &off))
+    let presses: Vec<ComparedPress> = (known.iter())
+        .map(|k| ComparedPress::new(&drawn, k, &glued, &off))
         .collect();
     let least = Least {
         presses: &presses,
@@ -187,7 +187,7 @@ fn a_machine_finds_a_part_that_is_softer() {
     let drawn = drawn();
     let off = Uncertainty {
         stiffness: 0.1,
-        pressing: Pressing::EXACT,
+        pressing: HandPressing::EXACT,
         ..off()
     };
     let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -230,7 +230,7 @@ fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
             tip,
             ..Making::EXACT
         },
-        pressing: Pressing::EXACT,
+        pressing: HandPressing::EXACT,
         ..off()
     };
     let untold = Uncertainty {
@@ -269,7 +269,7 @@ fn presses_speak_for_the_part_that_was_pressed() {
     let drawn = drawn();
     let off = Uncertainty {
         stiffness: 0.5,
-        pressing: Pressing::EXACT,
+        pressing: HandPressing::EXACT,
         ..off()
     };
     let mut rng = ChaCha8Rng::seed_from_u64(11);

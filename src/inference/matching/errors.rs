@@ -8,7 +8,7 @@ const LEAST_NOISE: f64 = 1e-9;
 
 /// What is known of the readings' errors.
 #[derive(Clone)]
-pub struct Errors {
+pub struct ReadingErrors {
     /// Standard deviation of each channel's noise (strain).
     pub noise: Vec<f64>,
     /// Standard deviation of what gains, places and model are off by, over the reading: half of it from the
@@ -23,7 +23,7 @@ pub struct Errors {
     pub stiffness: f64,
 }
 
-impl Errors {
+impl ReadingErrors {
     /// The same noise (strain) on every channel, and nothing else.
     #[must_use]
     pub fn of_noise(noise: f64, channels: usize) -> Self {

@@ -3,7 +3,7 @@
 use super::modes::{Mode, widest};
 use super::weighed::Observation;
 use super::{Contact, Matching};
-use crate::inference::deviation::About;
+use crate::inference::deviation::TouchDoubts;
 
 impl Matching {
     /// The touch that explains a reading (strain, a channel each) best.
@@ -66,7 +66,7 @@ impl Matching {
         }
         let begin = |&start: &usize| {
             let start = self.map.mesh.vertex_point(start);
-            self.begin(measured, start, None, About::default())
+            self.begin(measured, start, None, TouchDoubts::default())
         };
         let begun: Vec<Mode> = starts.iter().map(begin).collect();
         let best = begun

@@ -82,7 +82,7 @@ wide! {
         for (((block, gluing_deviation), out), highest) in
             blocks.zip(scores.chunks_exact_mut(LANES)).zip(highest)
         {
-            let glued = Glued { templates: block, spreads: gluing_deviation, reading, weights, drift };
+            let glued = GluedBlock { templates: block, spreads: gluing_deviation, reading, weights, drift };
             for (part, out) in out.chunks_exact_mut(PART).enumerate() {
                 let at = part * PART;
                 let mut force = glued.first_force(at, most);
@@ -109,7 +109,7 @@ const PART: usize = 32;
 const _: () = assert!(LANES.is_multiple_of(PART), "parts fill a block");
 
 /// A block of templates, what gluing spreads at each (a newton), and the reading that is compared with them.
-struct Glued<'a> {
+struct GluedBlock<'a> {
     templates: &'a [f32],
     spreads: &'a [f32],
     reading: &'a [f32],
@@ -119,14 +119,14 @@ struct Glued<'a> {
 
 /// Weighted sums of a part of a block: of reading times template, squares of templates, and, where they are asked for,
 /// squares of the reading and the logarithm of what variances have grown by.
-struct Sums {
+struct BlockSums {
     s: [f32; PART],
     d: [f32; PART],
     a: [f32; PART],
     log: [f32; PART],
 }
 
-impl Sums {
+impl BlockSums {
     #[allow(
         clippy::inline_always,
         reason = "part of a loop that is compiled for several instruction sets"
@@ -145,7 +145,7 @@ impl Sums {
     clippy::inline_always,
     reason = "parts of a loop that is compiled for several instruction sets"
 )]
-impl Glued<'_> {
+impl GluedBlock<'_> {
     /// The part of a channel's row that begins `at` a lane of the block.
     #[inline(always)]
     fn part(rows: &[f32], channel: usize, at: usize) -> &[f32; PART] {
@@ -156,7 +156,7 @@ impl Glued<'_> {
     /// The force that fits best where all channels are off alike.
     #[inline(always)]
     fn first_force(&self, at: usize, most: f32) -> [f32; PART] {
-        let mut sums = Sums {
+        let mut sums = BlockSums {
             s: [0.0; PART],
             d: [f32::MIN_POSITIVE; PART],
             a: [0.0; PART],
@@ -175,7 +175,7 @@ impl Glued<'_> {
 
     /// The sums by the weights that a touch of these forces has.
     #[inline(always)]
-    fn sums<const LAST: bool>(&self, at: usize, force: &[f32; PART]) -> Sums {
+    fn sums<const LAST: bool>(&self, at: usize, force: &[f32; PART]) -> BlockSums {
         let (mut s, mut d) = ([0.0_f32; PART], [f32::MIN_POSITIVE; PART]);
         let (mut a, mut log) = ([0.0_f32; PART], [0.0_f32; PART]);
         let mut widened = [1.0_f32; PART];
@@ -224,6 +224,6 @@ impl Glued<'_> {
                 }
             }
         }
-        Sums { s, d, a, log }
+        BlockSums { s, d, a, log }
     }
 }

@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use glam::{DMat2, DVec3};
 use nalgebra::Matrix3;
 
-use super::weighed::{Observation, Weighed, WeighedReading};
+use super::weighed::{Observation, WeighedReading, WeighedTouch};
 use super::{Contact, Load, Matching};
-use crate::inference::deviation::{About, Nuisance, Nuisances};
+use crate::inference::deviation::{Nuisance, Nuisances, TouchDoubts};
 use crate::inference::map::Slope;
 use crate::inference::region::{CredibleRegion, DEVIATIONS};
 use crate::mesh::SurfacePoint;
@@ -27,7 +27,7 @@ pub(in crate::inference) struct Mode {
     pub force: f64,
     force_variance: f64,
     /// What else is known of the touch, and how sure its force along the surface is (N).
-    about: About,
+    about: TouchDoubts,
     drag_deviation: f64,
     pub covariance: DMat2,
     plane: [DVec3; 2],
@@ -45,11 +45,11 @@ impl Mode {
 }
 
 /// What is held while places around one are tried.
-struct Terms<'a> {
-    weighed: Weighed,
+struct ModeTerms<'a> {
+    weighed: WeighedTouch,
     nuisances: Vec<Nuisance>,
     /// What is known of the touch already: what it reads changes with the place too.
-    about: About,
+    about: TouchDoubts,
     /// The reading, with as much more as makes a touch that is known to be made so one that is made otherwise only by
     /// chance.
     reading: Cow<'a, [f64]>,
@@ -63,8 +63,8 @@ impl Matching {
         observed: &'a Observation,
         at: SurfacePoint,
         force: Option<f64>,
-        about: About,
-    ) -> Terms<'a> {
+        about: TouchDoubts,
+    ) -> ModeTerms<'a> {
         let deviations = self.errors.deviations.as_ref();
         let own = deviations.map(|d| d.own.at(at));
         let shared = self.nuisances();
@@ -72,13 +72,13 @@ impl Matching {
         let fitting = || self.fitting_force(observed, &self.map.at(at), own.as_deref(), &nuisances);
         let force = force.unwrap_or_else(fitting);
         let mut reading = Cow::Borrowed(observed.reading());
-        if let Some(shared) = shared.filter(|_| about != About::default()) {
+        if let Some(shared) = shared.filter(|_| about != TouchDoubts::default()) {
             let known = shared.reading(&about, at);
             for (x, known) in reading.to_mut().iter_mut().zip(known) {
                 *x += force * known;
             }
         }
-        Terms {
+        ModeTerms {
             weighed: observed.weighed(own.as_deref(), &nuisances, force),
             nuisances,
             about,
@@ -91,9 +91,12 @@ impl Matching {
     }
 
     /// What a newton reads at a place, and how that changes, of a touch about which so much is known.
-    pub(in crate::inference) fn slope(&self, about: &About, at: SurfacePoint) -> Slope {
+    pub(in crate::inference) fn slope(&self, about: &TouchDoubts, at: SurfacePoint) -> Slope {
         let mut slope = self.map.slope(at);
-        if let Some(shared) = self.nuisances().filter(|_| *about != About::default()) {
+        if let Some(shared) = self
+            .nuisances()
+            .filter(|_| *about != TouchDoubts::default())
+        {
             shared.add(about, at, &mut slope);
         }
         slope
@@ -122,7 +125,7 @@ impl Matching {
         &self,
         observed: &Observation,
         start: SurfacePoint,
-        known: Option<(f64, About)>,
+        known: Option<(f64, TouchDoubts)>,
     ) -> Mode {
         let (force, about) = known.unzip();
         let about = about.unwrap_or_default();
@@ -137,7 +140,7 @@ impl Matching {
         observed: &Observation,
         start: SurfacePoint,
         force: Option<f64>,
-        about: About,
+        about: TouchDoubts,
     ) -> Mode {
         let terms = self.terms(observed, start, force, about);
         self.descend(observed, &terms, start)
@@ -149,7 +152,7 @@ impl Matching {
         &self,
         observed: &Observation,
         mut mode: Mode,
-        mut before: Option<(DVec3, About)>,
+        mut before: Option<(DVec3, TouchDoubts)>,
     ) -> Mode {
         let turns = match &self.errors.deviations {
             None => 0,
@@ -173,7 +176,7 @@ impl Matching {
     }
 
     /// Gauss–Newton on place and force, with Levenberg's damping.
-    fn descend(&self, observed: &Observation, terms: &Terms, start: SurfacePoint) -> Mode {
+    fn descend(&self, observed: &Observation, terms: &ModeTerms, start: SurfacePoint) -> Mode {
         let measured = WeighedReading::of(&terms.weighed, &terms.reading);
         let map = &self.map;
         let mut at = start;
@@ -244,7 +247,7 @@ impl Matching {
             position: self.map.mesh.point(at),
             force,
             force_variance: covariance[(2, 2)],
-            about: About::default(),
+            about: TouchDoubts::default(),
             drag_deviation: 0.0,
             covariance: DMat2::from_cols_array(&[
                 covariance[(0, 0)],

@@ -2,7 +2,7 @@
 
 /// Weighted sums of a reading and of what a newton reads at a place.
 #[derive(Clone, Copy, Default)]
-pub(in crate::inference) struct Sums {
+pub(in crate::inference) struct WeightedSums {
     /// Their product.
     pub s: f64,
     /// Squares of what a newton reads.
@@ -13,7 +13,7 @@ pub(in crate::inference) struct Sums {
     pub log: f64,
 }
 
-impl Sums {
+impl WeightedSums {
     /// Best force (N, at most `most_force`) and half the squares left over.
     pub fn fit(&self, most_force: f64) -> (f64, f64) {
         fit([self.s, self.d, self.squares], most_force)

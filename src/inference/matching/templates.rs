@@ -143,7 +143,7 @@ fn even_share(all: &[usize]) -> impl Iterator<Item = usize> {
 mod tests {
     use std::sync::Arc;
 
-    use super::super::Errors;
+    use super::super::ReadingErrors;
     use super::super::tests::{CHANNELS, maps};
     use super::*;
     use crate::inference::{Deviations, ResponseMap};
@@ -177,7 +177,7 @@ mod tests {
         // By Euler's formula as many edges as this.
         let nodes = points.len() + (points.len() + triangles.len() - 1);
         let map = ResponseMap::of(Arc::clone(&mesh), CHANNELS, vec![0.0; nodes * CHANNELS]);
-        let errors = Errors::of_noise(1e-6, CHANNELS);
+        let errors = ReadingErrors::of_noise(1e-6, CHANNELS);
         let mut matching = Matching::new(Arc::new(map), errors, 50.0);
         let observed = Observation::new(&[0.0; CHANNELS], &matching.errors, &matching.used);
         matching.score(&observed);
@@ -195,10 +195,10 @@ mod tests {
         let reading = [9e-6, 4e-6, 7e-6, 2e-6];
         for drift in [0.0, 1e-6, 20e-6] {
             for gluing_deviation in [None, Some(Arc::clone(&gluing_deviation))] {
-                let errors = Errors {
+                let errors = ReadingErrors {
                     deviations: gluing_deviation.map(Deviations::of_gluing),
                     drift,
-                    ..Errors::of_noise(1e-6, CHANNELS)
+                    ..ReadingErrors::of_noise(1e-6, CHANNELS)
                 };
                 let mut matching = Matching::new(Arc::clone(&map), errors, 50.0);
                 let observed = Observation::new(&reading, &matching.errors, &matching.used);

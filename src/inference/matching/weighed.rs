@@ -17,9 +17,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
 
-use super::Errors;
-use super::sums::{Product, Sums, fit};
-use crate::inference::deviation::{About, MOST, Nuisance};
+use super::ReadingErrors;
+use super::sums::{Product, WeightedSums, fit};
+use crate::inference::deviation::{MOST, Nuisance, TouchDoubts};
 use crate::inference::map::Slope;
 
 /// Errors that all channels may share: a drift, and as many nuisances as a place has at most.
@@ -31,7 +31,7 @@ const _: () = assert!(
 
 /// What channels are off by together.
 #[derive(Clone)]
-struct Shared {
+struct SharedErrors {
     /// Columns of P, a channel each; none where nothing is shared.
     pull: Vec<Vector4<f64>>,
     /// L⁻¹.
@@ -40,7 +40,7 @@ struct Shared {
     log: f64,
 }
 
-impl Shared {
+impl SharedErrors {
     /// By a variance of the drift (strain²) and the nuisances of a force (N), for weights `w`.
     fn of(drift: f64, nuisances: &[Nuisance], force: f64, w: &[f64]) -> Self {
         // Thousands of templates are weighed one by one.
@@ -110,7 +110,7 @@ fn whitening(inner: &Matrix4<f64>) -> (Matrix4<f64>, f64) {
 pub(in crate::inference) struct WeighedReading<'a> {
     x: &'a [f64],
     w: &'a [f64],
-    shared: &'a Shared,
+    shared: &'a SharedErrors,
     /// P x.
     pulled: Vector4<f64>,
     /// Weighted squares of a reading without a touch.
@@ -119,12 +119,12 @@ pub(in crate::inference) struct WeighedReading<'a> {
 
 impl<'a> WeighedReading<'a> {
     /// A reading by these weights.
-    pub fn of(weighed: &'a Weighed, x: &'a [f64]) -> Self {
+    pub fn of(weighed: &'a WeighedTouch, x: &'a [f64]) -> Self {
         Self::new(x, &weighed.w, &weighed.shared)
     }
 
     /// With one over the variance of each channel, and what all are off by together.
-    fn new(x: &'a [f64], w: &'a [f64], shared: &'a Shared) -> Self {
+    fn new(x: &'a [f64], w: &'a [f64], shared: &'a SharedErrors) -> Self {
         let pulled = shared.pulled(x);
         let squares: f64 = x.iter().zip(w).map(|(x, w)| w * x * x).sum();
         Self {
@@ -175,10 +175,10 @@ impl<'a> WeighedReading<'a> {
 
     /// What is in that which a touch of a force leaves over: `nuisances` are those of the place. And the standard
     /// deviation of the force along the surface (N), in the mean over both directions.
-    pub fn about(&self, g: &[f64], force: f64, nuisances: &[Nuisance]) -> (About, f64) {
+    pub fn about(&self, g: &[f64], force: f64, nuisances: &[Nuisance]) -> (TouchDoubts, f64) {
         let left = self.pulled - self.shared.pulled(g) * force;
         let shares = self.shared.whitening.transpose() * left;
-        let (mut about, mut variance) = (About::default(), 0.0);
+        let (mut about, mut variance) = (TouchDoubts::default(), 0.0);
         for (k, nuisance) in nuisances.iter().enumerate() {
             about.aside += nuisance.force * shares[k + 1];
             about.tip += nuisance.tip * shares[k + 1];
@@ -201,12 +201,12 @@ pub(in crate::inference) struct Observation<'a> {
     /// Variance of what all channels have drifted by together.
     pub drift: f64,
     /// What they have so, where gluing does not count.
-    shared: Shared,
+    shared: SharedErrors,
 }
 
 impl<'a> Observation<'a> {
     /// A reading with the weights that it has where gluing does not count.
-    pub fn new(reading: &'a [f64], errors: &Errors, used: &[bool]) -> Self {
+    pub fn new(reading: &'a [f64], errors: &ReadingErrors, used: &[bool]) -> Self {
         if reading.iter().all(|&x| is_a_strain(x)) {
             return Self::of(Cow::Borrowed(reading), errors, used);
         }
@@ -217,10 +217,10 @@ impl<'a> Observation<'a> {
         Self::of(Cow::Owned(reading), errors, &used)
     }
 
-    fn of(x: Cow<'a, [f64]>, errors: &Errors, used: &[bool]) -> Self {
+    fn of(x: Cow<'a, [f64]>, errors: &ReadingErrors, used: &[bool]) -> Self {
         let w = errors.weights(&x, used);
         let drift = errors.drift * errors.drift;
-        let shared = Shared::of(drift, &[], 0.0, &w);
+        let shared = SharedErrors::of(drift, &[], 0.0, &w);
         Self {
             squares: WeighedReading::new(&x, &w, &shared).squares,
             shared,
@@ -257,7 +257,7 @@ impl<'a> Observation<'a> {
         gluing_deviation: Option<&[f64]>,
         nuisances: &[Nuisance],
         force: f64,
-    ) -> Weighed {
+    ) -> WeighedTouch {
         let mut product = Product::default();
         let weight = |(c, w): (usize, &f64)| {
             let off = gluing_deviation.map_or(0.0, |deviation| force * deviation[c]);
@@ -266,8 +266,8 @@ impl<'a> Observation<'a> {
             w / wider
         };
         let w: Vec<f64> = self.w.iter().enumerate().map(weight).collect();
-        let shared = Shared::of(self.drift, nuisances, force, &w);
-        Weighed {
+        let shared = SharedErrors::of(self.drift, nuisances, force, &w);
+        WeighedTouch {
             log: 0.5 * product.ln() + shared.log - self.shared.log,
             shared,
             w,
@@ -276,8 +276,8 @@ impl<'a> Observation<'a> {
 
     /// The sums of [`Self::weighed`] without nuisances: thousands of templates are looked at one by one for a single
     /// reading, and no list is kept for any of them.
-    pub fn sums(&self, g: &[f64], gluing_deviation: Option<&[f64]>, force: f64) -> Sums {
-        let mut sums = Sums::default();
+    pub fn sums(&self, g: &[f64], gluing_deviation: Option<&[f64]>, force: f64) -> WeightedSums {
+        let mut sums = WeightedSums::default();
         let (mut all, mut of_x, mut of_g) = (0.0, 0.0, 0.0);
         let mut wider = Product::default();
         for (c, ((x, w), g)) in self.x.iter().zip(&self.w).zip(g).enumerate() {
@@ -301,7 +301,7 @@ impl<'a> Observation<'a> {
     }
 
     /// The reading under these weights, as it is compared with templates.
-    pub fn measured<'b>(&'b self, weighed: &'b Weighed) -> WeighedReading<'b> {
+    pub fn measured<'b>(&'b self, weighed: &'b WeighedTouch) -> WeighedReading<'b> {
         WeighedReading::of(weighed, &self.x)
     }
 
@@ -321,9 +321,9 @@ fn is_a_strain(x: f64) -> bool {
 }
 
 /// The weights of a reading for a touch at one place, of one force.
-pub(in crate::inference) struct Weighed {
+pub(in crate::inference) struct WeighedTouch {
     w: Vec<f64>,
-    shared: Shared,
+    shared: SharedErrors,
     /// Half the logarithm of the covariance's determinant, over that without gluing.
     pub log: f64,
 }
@@ -338,10 +338,10 @@ mod tests {
     const X: [f64; 4] = [3.0, -1.0, 2.0, 0.5];
     const G: [f64; 4] = [1.0, -0.5, 0.25, 0.2];
 
-    fn errors(drift: f64) -> Errors {
-        Errors {
+    fn errors(drift: f64) -> ReadingErrors {
+        ReadingErrors {
             drift,
-            ..Errors::of_noises(&[0.5, 1.0, 2.0, 0.25])
+            ..ReadingErrors::of_noises(&[0.5, 1.0, 2.0, 0.25])
         }
     }
 
@@ -446,7 +446,7 @@ mod tests {
     fn what_all_channels_share_says_nothing_where_they_may_have_drifted() {
         let (still, drifting) = (errors(0.0), errors(1e6));
         let shifted = X.map(|x| x + 5.0);
-        let force = |errors: &Errors, x: &[f64]| {
+        let force = |errors: &ReadingErrors, x: &[f64]| {
             let observed = Observation::new(x, errors, &[true; 4]);
             fit(&observed)
         };

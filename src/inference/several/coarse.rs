@@ -14,9 +14,9 @@ use rayon::prelude::*;
 
 use super::joint::APART;
 use super::spot::{RADII, Spot, nodes_near, pressed_over};
-use crate::inference::deviation::About;
+use crate::inference::deviation::TouchDoubts;
 use crate::inference::map::{LANES, ResponseMap};
-use crate::inference::matching::Errors;
+use crate::inference::matching::ReadingErrors;
 use crate::inference::matching::weighed::Observation;
 use crate::lanes::wide;
 use crate::mesh::SurfacePoint;
@@ -44,7 +44,7 @@ pub(super) struct Coarse {
 
 impl Coarse {
     /// A share of a map, with what its readings may be off by.
-    pub fn new(map: &ResponseMap, errors: &Errors) -> Self {
+    pub fn new(map: &ResponseMap, errors: &ReadingErrors) -> Self {
         let places = even(&map.mesh, PLACES, 0, |_| true);
         let readings: Vec<Vec<f64>> = places.iter().map(|&at| map.at(at)).collect();
         let squares = |rows: &mut dyn Iterator<Item = Vec<f64>>| -> f64 {
@@ -110,7 +110,7 @@ impl Coarse {
             at: self.places[place],
             force,
             radius: None,
-            about: About::default(),
+            about: TouchDoubts::default(),
         }
     }
 
@@ -220,7 +220,7 @@ impl Coarse {
                     at,
                     force,
                     radius: Some(radius),
-                    about: About::default(),
+                    about: TouchDoubts::default(),
                 });
             }
         }
@@ -253,10 +253,10 @@ impl Whitened {
         [(s * bb - t * ab) / apart, (t * aa - s * ab) / apart]
     }
 
-    fn blocks(&self, positions: &[DVec3]) -> Blocks {
+    fn blocks(&self, positions: &[DVec3]) -> PlaceBlocks {
         let channels = self.reading.len();
         let padded = positions.len().div_ceil(LANES) * LANES;
-        let mut blocks = Blocks {
+        let mut blocks = PlaceBlocks {
             channels,
             readings: vec![0.0; padded * channels],
             places: vec![0.0; padded * 3],
@@ -280,7 +280,7 @@ impl Whitened {
 }
 
 /// All places in blocks of [`LANES`], channel by channel, in single precision.
-struct Blocks {
+struct PlaceBlocks {
     channels: usize,
     readings: Vec<f32>,
     places: Vec<f32>,
@@ -290,7 +290,7 @@ struct Blocks {
 
 wide! {
     /// The place after the `i`-th of `count` that together with it explains most, and half of how much of the squares.
-    fn best_partner<'a>(blocks: &'a Blocks, i: usize, count: usize, most: f32) -> (f32, usize) {
+    fn best_partner<'a>(blocks: &'a PlaceBlocks, i: usize, count: usize, most: f32) -> (f32, usize) {
         let channels = blocks.channels;
         let (block, lane) = (i / LANES, i % LANES);
         let own: Vec<f32> = (0..channels)

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 
 use super::spot::{Felt, RADII, Spot};
-use crate::inference::deviation::{About, Nuisance};
+use crate::inference::deviation::{Nuisance, TouchDoubts};
 use crate::inference::matching::Matching;
 use crate::inference::matching::weighed::Observation;
 
@@ -54,7 +54,7 @@ impl Joint {
 }
 
 /// What is held while spots near by are tried.
-struct Held {
+struct HeldSpots {
     trusted: Vec<usize>,
     /// L of C = L Lᵀ.
     lower: DMatrix<f64>,
@@ -65,7 +65,7 @@ struct Held {
     reading: DVector<f64>,
 }
 
-impl Held {
+impl HeldSpots {
     fn whiten(&self, values: &[f64]) -> DVector<f64> {
         let picked = self.trusted.iter().map(|&c| values[c]);
         let mut v = DVector::from_iterator(self.trusted.len(), picked);
@@ -75,7 +75,7 @@ impl Held {
 }
 
 /// Spots that were tried: what is read of a newton at each, whitened, the best forces and half the squares left over.
-struct Tried {
+struct TriedSpots {
     spots: Vec<Spot>,
     felt: Vec<Felt>,
     readings: Vec<DVector<f64>>,
@@ -106,7 +106,7 @@ impl Matching {
         self.distributed(&held, &tried)
     }
 
-    fn held(&self, observed: &Observation, spots: &[Spot]) -> Option<Held> {
+    fn held(&self, observed: &Observation, spots: &[Spot]) -> Option<HeldSpots> {
         let trusted: Vec<usize> = (0..observed.w.len())
             .filter(|&c| observed.w[c] > 0.0)
             .collect();
@@ -131,14 +131,17 @@ impl Matching {
                 covariance.ger(1.0, &felt, &felt, 1.0);
             }
             nuisances.push(of_spot);
-            if let Some(shared) = self.nuisances().filter(|_| spot.about != About::default()) {
+            if let Some(shared) = self
+                .nuisances()
+                .filter(|_| spot.about != TouchDoubts::default())
+            {
                 for (x, known) in x.iter_mut().zip(shared.reading(&spot.about, spot.at)) {
                     *x += spot.force * known;
                 }
             }
         }
         let lower = covariance.cholesky()?.unpack();
-        let mut held = Held {
+        let mut held = HeldSpots {
             log: (0..n).map(|k| lower[(k, k)].ln()).sum(),
             reading: DVector::zeros(n),
             trusted,
@@ -150,7 +153,7 @@ impl Matching {
     }
 
     /// Best forces at these places; nothing where two of them are one, or one vanishes.
-    fn try_spots(&self, held: &Held, mut spots: Vec<Spot>) -> Option<Tried> {
+    fn try_spots(&self, held: &HeldSpots, mut spots: Vec<Spot>) -> Option<TriedSpots> {
         for (k, a) in spots.iter().enumerate() {
             let place = self.map.mesh.point(a.at);
             let near = |b: &Spot| self.map.mesh.point(b.at).distance(place) < APART;
@@ -170,7 +173,7 @@ impl Matching {
             spot.force = force.min(self.most_force);
         }
         let forces = DVector::from_iterator(spots.len(), spots.iter().map(|s| s.force));
-        Some(Tried {
+        Some(TriedSpots {
             left: 0.5 * (&held.reading - columns * forces).norm_squared(),
             spots,
             felt,
@@ -179,7 +182,12 @@ impl Matching {
     }
 
     /// Gauss–Newton on all places, with the best forces at each.
-    fn descend_together(&self, held: &Held, start: Vec<Spot>, steps: usize) -> Option<Tried> {
+    fn descend_together(
+        &self,
+        held: &HeldSpots,
+        start: Vec<Spot>,
+        steps: usize,
+    ) -> Option<TriedSpots> {
         let mut best = self.try_spots(held, start)?;
         let most = 3.0 * self.map.spacing();
         let mut damping = 1e-4;
@@ -223,7 +231,7 @@ impl Matching {
     }
 
     /// The normal distribution around the likeliest, and what lies under it.
-    fn distributed(&self, held: &Held, tried: &Tried) -> Option<Joint> {
+    fn distributed(&self, held: &HeldSpots, tried: &TriedSpots) -> Option<Joint> {
         let (columns, _) = equations(held, tried);
         let mut precision = columns.tr_mul(&columns);
         let area: f64 = self.map.areas.iter().sum();
@@ -266,7 +274,7 @@ impl Matching {
 }
 
 /// Columns of all unknowns, whitened, and what is left over of the reading.
-fn equations(held: &Held, tried: &Tried) -> (DMatrix<f64>, DVector<f64>) {
+fn equations(held: &HeldSpots, tried: &TriedSpots) -> (DMatrix<f64>, DVector<f64>) {
     let mut columns = Vec::new();
     let mut left = held.reading.clone();
     for ((spot, felt), reading) in tried.spots.iter().zip(&tried.felt).zip(&tried.readings) {
@@ -280,14 +288,14 @@ fn equations(held: &Held, tried: &Tried) -> (DMatrix<f64>, DVector<f64>) {
 
 /// What is in that which the spots leave over of how each was made, and the standard deviation of its force along the
 /// surface (N).
-fn about(held: &Held, spots: &[Spot], readings: &[DVector<f64>]) -> Vec<(About, f64)> {
+fn about(held: &HeldSpots, spots: &[Spot], readings: &[DVector<f64>]) -> Vec<(TouchDoubts, f64)> {
     let mut left = held.reading.clone();
     for (spot, reading) in spots.iter().zip(readings) {
         left.axpy(-spot.force, reading, 1.0);
     }
     let of_spot = |(spot, nuisances): (&Spot, &Vec<Nuisance>)| {
         // What was known already has been taken off reading and model alike: this is all of it.
-        let (mut about, mut variance) = (About::default(), 0.0);
+        let (mut about, mut variance) = (TouchDoubts::default(), 0.0);
         for nuisance in nuisances {
             let felt = held.whiten(&nuisance.reading) * spot.force;
             let share = felt.dot(&left);

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::inference::deviation::{About, Nuisance};
+use crate::inference::deviation::{Nuisance, TouchDoubts};
 use crate::inference::map::ResponseMap;
 use crate::inference::matching::Matching;
 use crate::mesh::SurfacePoint;
@@ -21,7 +21,7 @@ pub(super) struct Spot {
     pub force: f64,
     /// Of an area (m); absent for a point.
     pub radius: Option<f64>,
-    pub about: About,
+    pub about: TouchDoubts,
 }
 
 /// What is read of a newton there.

@@ -5,8 +5,8 @@ use std::path::{Component, Path, PathBuf};
 
 use glam::DVec3;
 
-use super::found::{Found, Touches};
-use super::plausible::{Origin, longest_side};
+use super::found::{FoundDataset, FoundTouches};
+use super::plausible::{FileOrigin, longest_side};
 use crate::io::{FileError, source};
 use crate::memory;
 use crate::plain::{self, mm, quote};
@@ -23,7 +23,7 @@ const MOST_NODES: f64 = 9.007e15;
 ///
 /// # Errors
 /// [`FileError`] naming the file, the line and what to do.
-pub(super) fn read(folder: &Path, touches: Touches) -> Result<Found, FileError> {
+pub(super) fn read(folder: &Path, touches: FoundTouches) -> Result<FoundDataset, FileError> {
     let files = match &touches.files {
         Some(names) => named(folder, &touches, names)?,
         None => in_folder(folder)?,
@@ -44,7 +44,11 @@ pub(super) fn read(folder: &Path, touches: Touches) -> Result<Found, FileError> 
 }
 
 /// The files that the touches name, each in the folder itself and each once.
-fn named(folder: &Path, touches: &Touches, names: &[String]) -> Result<Vec<PathBuf>, FileError> {
+fn named(
+    folder: &Path,
+    touches: &FoundTouches,
+    names: &[String],
+) -> Result<Vec<PathBuf>, FileError> {
     let mut seen = HashSet::new();
     for (number, name) in names.iter().enumerate() {
         let mut parts = Path::new(name).components();
@@ -141,7 +145,7 @@ impl Export {
         let (_, header) = rows
             .next()
             .ok_or_else(|| broken("the file is empty".into()))?;
-        let mut columns = Columns::of(header).map_err(broken)?;
+        let mut columns = ExportColumns::of(header).map_err(broken)?;
         let has = |mark: char| rows.clone().any(|(_, row)| row.contains(mark));
         columns.comma = has(',');
         if columns.comma && has('.') {
@@ -165,7 +169,7 @@ impl Export {
 }
 
 /// Which column of an export is what; node numbers come first, the value last.
-struct Columns {
+struct ExportColumns {
     axes: [usize; 3],
     value: usize,
     /// Metres to the unit of the places.
@@ -176,7 +180,7 @@ struct Columns {
     comma: bool,
 }
 
-impl Columns {
+impl ExportColumns {
     fn of(header: &str) -> Result<Self, String> {
         let labels: Vec<&str> = header.split('\t').map(str::trim).collect();
         let place = |axis: &str| {
@@ -290,7 +294,11 @@ fn length_unit(label: &str) -> Option<f64> {
 }
 
 /// One row a node that stands in every export, one column an export.
-fn join(folder: &Path, exports: &[Export], touches: Touches) -> Result<Found, FileError> {
+fn join(
+    folder: &Path,
+    exports: &[Export],
+    touches: FoundTouches,
+) -> Result<FoundDataset, FileError> {
     let Some(first) = exports.first() else {
         return Err(FileError::broken(folder, "there are no exports in it"));
     };
@@ -316,14 +324,14 @@ fn join(folder: &Path, exports: &[Export], touches: Touches) -> Result<Found, Fi
         .iter()
         .flat_map(|node| (exports.iter().zip(&rows)).map(move |(e, of)| e.values[of[node]]))
         .collect();
-    Ok(Found {
+    Ok(FoundDataset {
         values,
         targets: touches.mm,
         positions: kept.iter().map(|&k| first.positions[k]).collect(),
         costs: Vec::new(),
         forces: touches.forces,
         touches: touches.origin,
-        sites: Origin::nodes(folder, "sites", nodes),
+        sites: FileOrigin::nodes(folder, "sites", nodes),
         notes: (dropped > 0)
             .then(|| format!("{dropped} nodes are not in every export and were left out."))
             .into_iter()

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::plausible::{self, Origin, Places};
+use super::plausible::{self, FileOrigin, FilePlaces};
 use crate::dataset::SignalMatrix;
 use crate::io::FileError;
-use crate::io::table::Table;
+use crate::io::table::NamedTable;
 use crate::study::Data;
 
 /// Numbers beyond this, and its inverse, have squares that are none, or nothing.
@@ -21,7 +21,7 @@ pub struct GivenData {
 }
 
 /// What was read, not yet checked.
-pub(super) struct Found {
+pub(super) struct FoundDataset {
     /// By rows, one a site.
     pub(super) values: Vec<f64>,
     /// Of the touches (mm).
@@ -31,16 +31,16 @@ pub(super) struct Found {
     pub(super) costs: Vec<f64>,
     /// Of the touches (N); empty where nobody knows them.
     pub(super) forces: Vec<f64>,
-    pub(super) touches: Origin,
-    pub(super) sites: Origin,
+    pub(super) touches: FileOrigin,
+    pub(super) sites: FileOrigin,
     pub(super) notes: Vec<String>,
 }
 
-impl Found {
+impl FoundDataset {
     /// Touches that something can be learned from.
     pub(super) fn check_apart(&self) -> Result<(), FileError> {
         let touches = self.targets.iter().map(|&p| DVec3::from_array(p));
-        Places::new(&self.touches, touches).check_apart()
+        FilePlaces::new(&self.touches, touches).check_apart()
     }
 
     pub(super) fn checked(self, path: &Path) -> Result<GivenData, FileError> {
@@ -62,8 +62,8 @@ impl Found {
         let sites = self.positions.iter().map(|&p| p * 1e3);
         let mut notes = self.notes;
         notes.extend(plausible::check(
-            &Places::new(&self.touches, touches),
-            &Places::new(&self.sites, sites),
+            &FilePlaces::new(&self.touches, touches),
+            &FilePlaces::new(&self.sites, sites),
         )?);
         Ok(GivenData {
             data: Data {
@@ -105,17 +105,17 @@ impl Found {
 pub(super) const PLACE: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 
 /// Where the touches were, and the file of each where the table names one.
-pub(super) struct Touches {
+pub(super) struct FoundTouches {
     pub(super) mm: Vec<[f64; 3]>,
     /// N; empty where the table has none.
     pub(super) forces: Vec<f64>,
-    pub(super) origin: Origin,
+    pub(super) origin: FileOrigin,
     pub(super) files: Option<Vec<String>>,
 }
 
-impl Touches {
+impl FoundTouches {
     pub(super) fn read(path: &Path) -> Result<Self, FileError> {
-        let table = Table::read(path)?;
+        let table = NamedTable::read(path)?;
         let columns = table.columns(&PLACE)?;
         let file = table.column("file")?;
         let force = table.column("force_n")?;
@@ -136,7 +136,7 @@ impl Touches {
         Ok(Self {
             mm,
             forces,
-            origin: Origin::lines(path, "touches", lines),
+            origin: FileOrigin::lines(path, "touches", lines),
             files: file.map(|_| files),
         })
     }

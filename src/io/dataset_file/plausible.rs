@@ -20,14 +20,14 @@ const WIDE: f64 = 2_000.0;
 const ONE: f64 = 1e-6;
 
 /// Where places stand in a file, so that a message can name one.
-pub struct Origin {
+pub struct FileOrigin {
     path: PathBuf,
     /// Touches or sites.
     what: &'static str,
-    kind: Kind,
+    kind: ValueKind,
 }
 
-enum Kind {
+enum ValueKind {
     /// Rows of an array, in metres.
     Array(&'static str),
     /// Lines of a table, in millimetres.
@@ -36,20 +36,20 @@ enum Kind {
     Nodes(Vec<u64>),
 }
 
-impl Origin {
+impl FileOrigin {
     pub fn array(path: &Path, what: &'static str, name: &'static str) -> Self {
-        Self::of(path, what, Kind::Array(name))
+        Self::of(path, what, ValueKind::Array(name))
     }
 
     pub fn lines(path: &Path, what: &'static str, lines: Vec<u64>) -> Self {
-        Self::of(path, what, Kind::Lines(lines))
+        Self::of(path, what, ValueKind::Lines(lines))
     }
 
     pub fn nodes(path: &Path, what: &'static str, nodes: Vec<u64>) -> Self {
-        Self::of(path, what, Kind::Nodes(nodes))
+        Self::of(path, what, ValueKind::Nodes(nodes))
     }
 
-    fn of(path: &Path, what: &'static str, kind: Kind) -> Self {
+    fn of(path: &Path, what: &'static str, kind: ValueKind) -> Self {
         Self {
             path: path.to_owned(),
             what,
@@ -63,20 +63,20 @@ impl Origin {
 
     fn name(&self, number: usize) -> String {
         match &self.kind {
-            Kind::Array(name) => format!("{name}[{number}]"),
-            Kind::Lines(lines) => format!("line {}", lines[number]),
-            Kind::Nodes(nodes) => format!("node {}", nodes[number]),
+            ValueKind::Array(name) => format!("{name}[{number}]"),
+            ValueKind::Lines(lines) => format!("line {}", lines[number]),
+            ValueKind::Nodes(nodes) => format!("node {}", nodes[number]),
         }
     }
 
     /// What to do about a unit.
     fn unit(&self) -> String {
         match self.kind {
-            Kind::Array(name) => {
+            ValueKind::Array(name) => {
                 format!("{name} is in metres: divide it by 1000 if it is in millimetres")
             }
-            Kind::Lines(_) => "x_mm, y_mm and z_mm are in millimetres".to_owned(),
-            Kind::Nodes(_) => "check the unit in the first line of the exports".to_owned(),
+            ValueKind::Lines(_) => "x_mm, y_mm and z_mm are in millimetres".to_owned(),
+            ValueKind::Nodes(_) => "check the unit in the first line of the exports".to_owned(),
         }
     }
 
@@ -86,15 +86,15 @@ impl Origin {
 }
 
 /// Places, and where they stand.
-pub struct Places<'a> {
-    origin: &'a Origin,
+pub struct FilePlaces<'a> {
+    origin: &'a FileOrigin,
     /// mm.
     points: Vec<DVec3>,
 }
 
-impl<'a> Places<'a> {
+impl<'a> FilePlaces<'a> {
     /// Of finite points (mm).
-    pub fn new(origin: &'a Origin, points: impl Iterator<Item = DVec3>) -> Self {
+    pub fn new(origin: &'a FileOrigin, points: impl Iterator<Item = DVec3>) -> Self {
         Self {
             origin,
             points: points.collect(),
@@ -162,7 +162,7 @@ impl<'a> Places<'a> {
 ///
 /// # Errors
 /// [`FileError`] naming the file and, where one is to blame, the place.
-pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError> {
+pub fn check(touches: &FilePlaces, sites: &FilePlaces) -> Result<Vec<String>, FileError> {
     touches.within_reach()?;
     sites.within_reach()?;
     let (pressed, read) = (touches.longest_side(), sites.longest_side());
@@ -185,7 +185,7 @@ pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError>
 }
 
 /// What is said where touches and sites agree on a part (mm) that is larger than what a hand presses.
-fn in_doubt(size: f64, touches: &Places, sites: &Places) -> String {
+fn in_doubt(size: f64, touches: &FilePlaces, sites: &FilePlaces) -> String {
     let mut units = vec![touches.origin.unit()];
     if !sites.points.is_empty() {
         units.push(sites.origin.unit());

@@ -3,15 +3,15 @@
 use glam::DVec2;
 
 use super::marks::{BLUE, INK, gauge, label};
-use super::source::Source;
-use crate::paper::{Align, Face, Flow, Ink, Line, Sheet, Words};
-use crate::workshop::{Glued, Landmarks, Patch};
+use super::source::HandoverSource;
+use crate::paper::{Align, Flow, Ink, PlacedWords, Sheet, SheetLine, Typeface};
+use crate::workshop::{GluedGauge, Landmarks, Patch};
 
 const HEIGHT: f64 = 50.0;
 const PICTURE: f64 = 46.0;
 
 /// Of all gauges.
-pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
+pub(super) fn all(flow: &mut Flow, source: &HandoverSource<'_>) {
     flow.heading("A card for each gauge");
     flow.text("Pictures are at full size and seen from inside, with the part's axis up; blue is an edge of the wall. Lengths are straight, as callipers measure them, from the middle of the gauge.");
     for (glued, landmarks) in source.inner.gauges.iter().zip(&source.landmarks) {
@@ -39,11 +39,17 @@ fn frame(sheet: &mut Sheet, corner: DVec2) {
         corner + size,
         corner + DVec2::new(0.0, size.y),
     ];
-    sheet.shape(points, None, Some(Line::new([0xd8, 0xdc, 0xe3], 0.2)));
+    sheet.shape(points, None, Some(SheetLine::new([0xd8, 0xdc, 0xe3], 0.2)));
 }
 
 /// The wall's edges and the gauges in the frame.
-fn picture(sheet: &mut Sheet, source: &Source<'_>, patch: &Patch, glued: &Glued, corner: DVec2) {
+fn picture(
+    sheet: &mut Sheet,
+    source: &HandoverSource<'_>,
+    patch: &Patch,
+    glued: &GluedGauge,
+    corner: DVec2,
+) {
     let half = PICTURE / 2.0;
     let middle = corner + DVec2::splat(half);
     let place = |p: DVec2| middle + DVec2::new(p.x, -p.y) * 1e3;
@@ -52,7 +58,7 @@ fn picture(sheet: &mut Sheet, source: &Source<'_>, patch: &Patch, glued: &Glued,
         if let Some(ends) = clipped(ends, half) {
             sheet.line(
                 ends.map(|p| middle + DVec2::new(p.x, -p.y)),
-                Line::new(BLUE, 0.35),
+                SheetLine::new(BLUE, 0.35),
             );
         }
     }
@@ -98,7 +104,13 @@ fn clipped([a, b]: [DVec2; 2], half: f64) -> Option<[DVec2; 2]> {
     (from < to).then(|| [a + way * from, a + way * to])
 }
 
-fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, corner: DVec2) {
+fn words(
+    sheet: &mut Sheet,
+    source: &HandoverSource<'_>,
+    glued: &GluedGauge,
+    at: &Landmarks,
+    corner: DVec2,
+) {
     const PALE: Ink = [0x4a, 0x55, 0x68];
     /// Between two lines, and before their texts (mm).
     const LINE: f64 = 4.9;
@@ -112,11 +124,11 @@ fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, 
             (at, label.to_owned(), 2.8, PALE),
             (at + DVec2::new(IN, 0.0), text, 3.1, INK),
         ] {
-            sheet.words(Words {
+            sheet.words(PlacedWords {
                 at,
                 text,
                 size,
-                face: Face::Text,
+                face: Typeface::Text,
                 ink,
                 align: Align::Left,
             });
@@ -125,7 +137,7 @@ fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, 
 }
 
 /// Where it is.
-fn place(glued: &Glued, at: &Landmarks) -> Vec<(&'static str, String)> {
+fn place(glued: &GluedGauge, at: &Landmarks) -> Vec<(&'static str, String)> {
     let mm = |metres: f64| format!("{:.1} mm", metres * 1e3);
     let side = if at.turned_deg >= 0.0 {
         "clockwise"
@@ -182,7 +194,7 @@ fn place(glued: &Glued, at: &Landmarks) -> Vec<(&'static str, String)> {
 }
 
 /// What it reads, and where it is wired to.
-fn read(source: &Source<'_>, glued: &Glued) -> Vec<(&'static str, String)> {
+fn read(source: &HandoverSource<'_>, glued: &GluedGauge) -> Vec<(&'static str, String)> {
     let channel = source
         .wiring
         .channels

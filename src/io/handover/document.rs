@@ -1,6 +1,6 @@
 //! `report.pdf`.
 
-use super::source::Source;
+use super::source::HandoverSource;
 use super::{cards, drawing, jig_pages};
 use crate::design::curves::failure_ways;
 use crate::design::{BLIND, Design};
@@ -20,7 +20,7 @@ const ASSEMBLY: [&str; 8] = [
 ];
 
 /// All sheets.
-pub(super) fn sheets(source: &Source<'_>) -> Vec<Sheet> {
+pub(super) fn sheets(source: &HandoverSource<'_>) -> Vec<Sheet> {
     let mut flow = Flow::new(source.format);
     flow.title(&format!("Gauge placement for {}", source.name));
     promise(&mut flow, source);
@@ -46,7 +46,7 @@ pub(super) fn sheets(source: &Source<'_>) -> Vec<Sheet> {
     ))
 }
 
-fn promise(flow: &mut Flow, source: &Source<'_>) {
+fn promise(flow: &mut Flow, source: &HandoverSource<'_>) {
     let design = source.design;
     let chosen = design.chosen().len();
     let selector = source.inputs.project.selection.selector;
@@ -157,7 +157,7 @@ fn failures(flow: &mut Flow, design: &Design) {
     );
 }
 
-fn wiring(flow: &mut Flow, source: &Source<'_>) {
+fn wiring(flow: &mut Flow, source: &HandoverSource<'_>) {
     flow.heading("Wiring");
     for words in source.wiring.words() {
         flow.point("•", &words);

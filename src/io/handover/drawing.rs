@@ -3,18 +3,18 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::marks::small;
-use super::source::Source;
+use super::source::HandoverSource;
 use crate::io::report::{feasible_tint, markers};
-use crate::io::svg::{Paint, View, bounds, from_behind, standard_views};
+use crate::io::svg::{Paint, ViewSide, bounds, from_behind, standard_views};
 use crate::mesh::flatten::Flat;
 use crate::mesh::stretch::KEPT;
-use crate::paper::{Align, Flow, Line, Sheet};
+use crate::paper::{Align, Flow, Sheet, SheetLine};
 
 /// Of a picture of a side (mm).
 const HEIGHT: f64 = 88.0;
 
 /// The limb from four sides, and unrolled as seen from outside.
-pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
+pub(super) fn all(flow: &mut Flow, source: &HandoverSource<'_>) {
     /// Between two pictures (mm).
     const GAP: f64 = 4.0;
     flow.need(2.0 * HEIGHT);
@@ -43,14 +43,14 @@ pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
 }
 
 /// A box that a picture is fitted into: its corner (mm) and its scale (mm a metre); up is up.
-struct Fit {
+struct PictureFit {
     corner: DVec2,
     lower: DVec2,
     height: f64,
     scale: f64,
 }
 
-impl Fit {
+impl PictureFit {
     fn new(lower: DVec2, upper: DVec2, corner: DVec2, room: DVec2) -> Self {
         let size = (upper - lower).max(DVec2::splat(1e-9));
         let scale = (room / size).min_element();
@@ -71,9 +71,9 @@ impl Fit {
 
 fn side(
     sheet: &mut Sheet,
-    source: &Source<'_>,
+    source: &HandoverSource<'_>,
     tint: &[f64],
-    view: &View,
+    view: &ViewSide,
     corner: DVec2,
     room: DVec2,
 ) {
@@ -82,7 +82,7 @@ fn side(
     let frame = DMat3::from_cols(right, view.toward.cross(right), view.toward).transpose();
     let seen: Vec<DVec3> = mesh.positions().iter().map(|&p| frame * p).collect();
     let (lower, upper) = bounds(seen.iter().map(|p| p.truncate()));
-    let fit = Fit::new(lower, upper, corner, room);
+    let fit = PictureFit::new(lower, upper, corner, room);
     for t in from_behind(mesh.triangles(), &seen) {
         let tri = mesh.triangles()[t];
         let facing = mesh.facet_normal(t as u32).dot(view.toward);
@@ -105,10 +105,10 @@ fn side(
 
 /// A hairline of the same colour closes what would shine through between facets.
 fn facet(sheet: &mut Sheet, corners: [DVec2; 3], ink: [u8; 3]) {
-    sheet.shape(corners, Some(ink), Some(Line::new(ink, 0.05)));
+    sheet.shape(corners, Some(ink), Some(SheetLine::new(ink, 0.05)));
 }
 
-fn unrolled(flow: &mut Flow, source: &Source<'_>, tint: &[f64]) {
+fn unrolled(flow: &mut Flow, source: &HandoverSource<'_>, tint: &[f64]) {
     let mesh = &source.design.simulated.mesh;
     let flat = Flat::of(mesh, source.inner.stance);
     let size = flat.upper - flat.lower;
@@ -119,7 +119,7 @@ fn unrolled(flow: &mut Flow, source: &Source<'_>, tint: &[f64]) {
         flat.stretch.words().replace("Hatched", "Shaded")
     );
     let (sheet, corner) = flow.room(height + 3.0);
-    let fit = Fit::new(flat.lower, flat.upper, corner, DVec2::new(width, height));
+    let fit = PictureFit::new(flat.lower, flat.upper, corner, DVec2::new(width, height));
     for t in from_behind(&flat.triangles, &flat.positions) {
         let tri = flat.triangles[t];
         let corners = tri.map(|v| fit.place(flat.positions[v as usize].truncate()));

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DMat3, DVec3};
 
 use crate::io::table::Writing;
-use crate::jig::{Jig, Part, Stack, parts};
+use crate::jig::{Jig, PrintedPart, Stack, parts};
 use crate::mesh::Facets;
 
 /// The folder of a jig in that of a design.
@@ -28,7 +28,8 @@ pub fn files(jig: &Jig) -> Vec<(String, Vec<u8>)> {
     if jig.stacks.is_empty() {
         return Vec::new();
     }
-    let made: Vec<(&Stack, Vec<Part>)> = jig.stacks.iter().map(|s| (s, parts(jig, s))).collect();
+    let made: Vec<(&Stack, Vec<PrintedPart>)> =
+        jig.stacks.iter().map(|s| (s, parts(jig, s))).collect();
     let pieces = made.iter().flat_map(|(_, parts)| parts);
     let mut files: Vec<(String, Vec<u8>)> = pieces
         .map(|part| {
@@ -44,7 +45,7 @@ pub fn files(jig: &Jig) -> Vec<(String, Vec<u8>)> {
 }
 
 /// A row a piece, in the order in which they are put onto their rod.
-fn table(jig: &Jig, made: &[(&Stack, Vec<Part>)]) -> String {
+fn table(jig: &Jig, made: &[(&Stack, Vec<PrintedPart>)]) -> String {
     let mut table = Writing::new([
         "step",
         "file",

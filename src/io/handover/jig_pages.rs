@@ -3,10 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::marks::{ACCENT, INK};
-use super::source::Source;
+use super::source::HandoverSource;
 use crate::gauge::Gauge;
 use crate::jig::{Arm, Jig, Stack, bar, outline};
-use crate::paper::{Align, Flow, Ink, Line, Sheet};
+use crate::paper::{Align, Flow, Ink, Sheet, SheetLine};
 use crate::workshop::Inner;
 
 /// Pictures in a row, and how high each is (mm).
@@ -23,7 +23,7 @@ const USE: [&str; 5] = [
 ];
 
 /// The section; nothing where nothing is chosen.
-pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
+pub(super) fn all(flow: &mut Flow, source: &HandoverSource<'_>) {
     let jig = &source.jig;
     if jig.stacks.is_empty() && jig.left_out.is_empty() {
         return;
@@ -56,7 +56,7 @@ pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
 }
 
 /// The nearest feasible site that the jig gets to, in words.
-fn instead(source: &Source<'_>, number: usize) -> Option<String> {
+fn instead(source: &HandoverSource<'_>, number: usize) -> Option<String> {
     /// Of the nearest.
     const TRIED: usize = 150;
     let gauge = source.inner.gauges.iter().find(|g| g.number == number)?;
@@ -75,7 +75,7 @@ fn instead(source: &Source<'_>, number: usize) -> Option<String> {
     ))
 }
 
-fn stack_of(flow: &mut Flow, source: &Source<'_>, stack: &Stack) {
+fn stack_of(flow: &mut Flow, source: &HandoverSource<'_>, stack: &Stack) {
     let jig = &source.jig;
     let letter = &stack.letter;
     let after = if letter == "a" {
@@ -192,19 +192,19 @@ fn picture(
         let q = (p - low) * scale;
         corner + spare / 2.0 + DVec2::new(q.x, (high - low).y * scale - q.y)
     };
-    let pale = Line::new([0xa0, 0xa8, 0xb4], 0.2);
+    let pale = SheetLine::new([0xa0, 0xa8, 0xb4], 0.2);
     sheet.shape(around.into_iter().map(place), None, Some(pale));
     for (_, body, ink) in bodies {
         sheet.shape(
             body.into_iter().map(place),
             Some(ink),
-            Some(Line::new(INK, 0.12)),
+            Some(SheetLine::new(INK, 0.12)),
         );
     }
     if let Some(arm) = arms.last() {
         let at = arm.pad.point(DVec2::ZERO, arm.pad.back);
         let at = place(flat(at));
-        sheet.circle(at, 2.1, Some([255; 3]), Some(Line::new(ACCENT, 0.25)));
+        sheet.circle(at, 2.1, Some([255; 3]), Some(SheetLine::new(ACCENT, 0.25)));
         sheet.say(
             at + DVec2::new(0.0, 1.0),
             &arm.number.to_string(),

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::jig::FILM;
-use crate::paper::{Align, Face, Ink, Line, Sheet, Words};
+use crate::paper::{Align, Ink, PlacedWords, Sheet, SheetLine, Typeface};
 
 pub(super) const ACCENT: Ink = [0xd5, 0x5e, 0x00];
 pub(super) const INK: Ink = [0x1d, 0x24, 0x30];
@@ -19,12 +19,12 @@ pub(super) fn gauge(sheet: &mut Sheet, at: DVec2, along: DVec2, size: DVec2, num
     sheet.shape(
         corners(size / 2.0 + FILM),
         Some([255; 3]),
-        Some(Line::new(ACCENT, 0.2)),
+        Some(SheetLine::new(ACCENT, 0.2)),
     );
     sheet.shape(
         corners(size / 2.0),
         Some([0xfb, 0xe3, 0xcf]),
-        Some(Line::new(ACCENT, 0.3)),
+        Some(SheetLine::new(ACCENT, 0.3)),
     );
     let reach = size.x / 2.0 + FILM.x;
     let cross = [
@@ -34,16 +34,19 @@ pub(super) fn gauge(sheet: &mut Sheet, at: DVec2, along: DVec2, size: DVec2, num
     for way in cross {
         for side in [-1.0, 1.0] {
             let inner = way * (1.0 - 3.0 / way.length());
-            sheet.line([at + inner * side, at + way * side], Line::new(ACCENT, 0.2));
+            sheet.line(
+                [at + inner * side, at + way * side],
+                SheetLine::new(ACCENT, 0.2),
+            );
         }
     }
     sheet.line(
         [at - along * (size.x / 2.0), at + along * (size.x / 2.0)],
-        Line::new(ACCENT, 0.15),
+        SheetLine::new(ACCENT, 0.15),
     );
     sheet.line(
         [at - across * (size.y / 2.0), at + across * (size.y / 2.0)],
-        Line::new(ACCENT, 0.15),
+        SheetLine::new(ACCENT, 0.15),
     );
     // The number stands beside the film.
     let beside =
@@ -56,9 +59,9 @@ pub(super) fn small(sheet: &mut Sheet, at: DVec2, along: DVec2, number: usize, n
     const REACH: f64 = 4.2;
     const RADIUS: f64 = 2.0;
     let dash = (!near).then_some([0.8, 0.6]);
-    let line = Line {
+    let line = SheetLine {
         dash,
-        ..Line::new(ACCENT, 1.1)
+        ..SheetLine::new(ACCENT, 1.1)
     };
     sheet.line([at - along * REACH, at + along * REACH], line);
     let (fill, ink) = if near {
@@ -66,7 +69,7 @@ pub(super) fn small(sheet: &mut Sheet, at: DVec2, along: DVec2, number: usize, n
     } else {
         ([255; 3], ACCENT)
     };
-    sheet.circle(at, RADIUS, Some(fill), Some(Line::new(ACCENT, 0.25)));
+    sheet.circle(at, RADIUS, Some(fill), Some(SheetLine::new(ACCENT, 0.25)));
     number_at(sheet, at, number, ink);
 }
 
@@ -78,11 +81,11 @@ pub(super) fn label(sheet: &mut Sheet, at: DVec2, number: usize) {
 
 fn number_at(sheet: &mut Sheet, at: DVec2, number: usize, ink: Ink) {
     const SIZE: f64 = 2.6;
-    sheet.words(Words {
+    sheet.words(PlacedWords {
         at: at + DVec2::new(0.0, 0.36 * SIZE),
         text: number.to_string(),
         size: SIZE,
-        face: Face::Fixed,
+        face: Typeface::Fixed,
         ink,
         align: Align::Middle,
     });

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::colormap::ColorMap;
-use crate::io::glb::{Piece, write_scene};
+use crate::io::glb::{ScenePiece, write_scene};
 use crate::mesh::{Facets, TriMesh};
 use crate::workshop::{Inner, arrow, frame, plate};
 
@@ -12,7 +12,7 @@ const GAUGE: [u8; 3] = [0xd5, 0x5e, 0x00];
 const TOUCH: [u8; 3] = [0x00, 0x72, 0xb2];
 
 /// What a scene shows.
-pub struct Scene<'a> {
+pub struct StepScene<'a> {
     /// The limb (m).
     pub limb: &'a TriMesh,
     /// What colours it, 0–1 a vertex; grey where there is nothing.
@@ -27,7 +27,7 @@ pub struct Scene<'a> {
     pub run: Option<&'a str>,
 }
 
-impl Scene<'_> {
+impl StepScene<'_> {
     /// Its bytes.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl Scene<'_> {
             None => LIMB,
         };
         let corners = self.limb.positions();
-        let mut pieces = vec![Piece {
+        let mut pieces = vec![ScenePiece {
             name: "limb".into(),
             positions: corners.to_vec(),
             triangles: self.limb.triangles().to_vec(),
@@ -65,8 +65,8 @@ impl Scene<'_> {
     }
 }
 
-fn piece(name: &str, solid: Facets, colour: [u8; 3]) -> Piece {
-    Piece {
+fn piece(name: &str, solid: Facets, colour: [u8; 3]) -> ScenePiece {
+    ScenePiece {
         name: name.to_owned(),
         colours: vec![colour; solid.positions.len()],
         positions: solid.positions,

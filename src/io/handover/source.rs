@@ -3,11 +3,11 @@
 use crate::design::{Design, Inputs};
 use crate::io::run::Provenance;
 use crate::jig::Jig;
-use crate::paper::Format;
+use crate::paper::SheetSize;
 use crate::workshop::{Inner, Landmarks, Wiring};
 
 /// Everything that is known.
-pub(super) struct Source<'a> {
+pub(super) struct HandoverSource<'a> {
     pub inputs: &'a Inputs,
     pub design: &'a Design,
     pub provenance: &'a Provenance<'a>,
@@ -18,10 +18,10 @@ pub(super) struct Source<'a> {
     pub name: String,
     /// The key of the run.
     pub run: String,
-    pub format: Format,
+    pub format: SheetSize,
 }
 
-impl Source<'_> {
+impl HandoverSource<'_> {
     /// What must be bought: what is, how much, and what about it.
     pub fn bill(&self) -> Vec<[String; 3]> {
         let mut bill = crate::workshop::bill(&self.wiring);

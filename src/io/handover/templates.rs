@@ -7,15 +7,15 @@ use glam::DVec2;
 
 use self::head::{HEAD, MARGIN, head};
 use super::marks::{BLUE, INK, gauge, label};
-use super::source::Source;
-use crate::paper::{Align, Line, Sheet};
-use crate::workshop::{Glued, Landmarks, Patch};
+use super::source::HandoverSource;
+use crate::paper::{Align, Sheet, SheetLine};
+use crate::workshop::{GluedGauge, Landmarks, Patch};
 
 /// All sheets: a patch for each gauge, then the whole inside.
 ///
 /// # Errors
 /// Where a gauge lies on no wall.
-pub(super) fn sheets(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
+pub(super) fn sheets(source: &HandoverSource<'_>) -> Result<Vec<Sheet>, String> {
     let mut sheets = patches(source)?;
     sheets.extend(tiles::sheets(source));
     let count = sheets.len();
@@ -36,7 +36,7 @@ pub(super) fn sheets(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
     Ok(sheets)
 }
 
-fn patches(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
+fn patches(source: &HandoverSource<'_>) -> Result<Vec<Sheet>, String> {
     /// Between two patches, and below each for its words (mm).
     const GAP: f64 = 6.0;
     const WORDS: f64 = 10.0;
@@ -84,7 +84,7 @@ fn patches(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
 
 /// Of a patch (mm): beyond the nearest edge of the wall, so that it can be put in one way only, and not so large that a tube
 /// cannot be laid flat.
-fn radius(source: &Source<'_>, landmarks: &Landmarks) -> f64 {
+fn radius(source: &HandoverSource<'_>, landmarks: &Landmarks) -> f64 {
     const BEYOND: f64 = 12.0;
     const LARGEST: f64 = 34.0;
     let keys = &source.inputs.project.gauge;
@@ -95,9 +95,9 @@ fn radius(source: &Source<'_>, landmarks: &Landmarks) -> f64 {
 
 fn one(
     sheet: &mut Sheet,
-    source: &Source<'_>,
+    source: &HandoverSource<'_>,
     patch: &Patch,
-    glued: &Glued,
+    glued: &GluedGauge,
     middle: DVec2,
     radius: f64,
 ) {
@@ -108,7 +108,7 @@ fn one(
         if !inside.is_empty() {
             let grey = [0xf2, 0xf3, 0xf5];
             let drawn = inside.into_iter().map(|p| middle + DVec2::new(p.x, -p.y));
-            sheet.shape(drawn, Some(grey), Some(Line::new(grey, 0.05)));
+            sheet.shape(drawn, Some(grey), Some(SheetLine::new(grey, 0.05)));
         }
     }
     for edge in &patch.edges {
@@ -117,11 +117,11 @@ fn one(
             let ends = [a.lerp(b, from), a.lerp(b, to)];
             sheet.line(
                 ends.map(|p| middle + DVec2::new(p.x, -p.y)),
-                Line::new(BLUE, 0.4),
+                SheetLine::new(BLUE, 0.4),
             );
         }
     }
-    sheet.circle(middle, radius, None, Some(Line::new(INK, 0.2)));
+    sheet.circle(middle, radius, None, Some(SheetLine::new(INK, 0.2)));
     let keys = &source.inputs.project.gauge;
     let size = DVec2::new(keys.grid_length_mm, keys.grid_width_mm);
     for other in source

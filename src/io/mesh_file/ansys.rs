@@ -13,18 +13,18 @@ mod selection;
 
 use std::rc::Rc;
 
-use super::found::System;
-use super::place::Origin;
+use super::found::UnitSystem;
+use super::place::ElementName;
 use super::sets::Numbered;
 use super::soup::Soup;
 use super::words::at;
 use crate::elasticity::DofSet;
 use crate::plain::quote;
-use command::{DeckCommand, Lines, Statement, statements};
-use elements::{Element, Routine};
+use command::{DeckCommand, DeckLines, Statement, statements};
+use elements::{DeckElement, Routine};
 use glam::DVec3;
-use reader::Reader;
-use selection::{Nodes, Selection};
+use reader::DeckReader;
+use selection::{DeckSelection, Nodes};
 
 /// Commands that change nothing about the part: the program's own, how it solves, and what it writes.
 const SILENT: &[&str] = &[
@@ -51,8 +51,8 @@ const WEIGHTY: &[&str] = &[
 /// A message naming the line.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     let text = String::from_utf8_lossy(bytes);
-    let mut lines = Lines::of(&text);
-    let mut reader = Reader::default();
+    let mut lines = DeckLines::of(&text);
+    let mut reader = DeckReader::default();
     while let Some((number, line)) = lines.next() {
         for statement in statements(line, number) {
             match statement {
@@ -68,7 +68,7 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     reader.finish()
 }
 
-impl Reader {
+impl DeckReader {
     /// Numbers without a block that is read.
     fn stray(&mut self, line: usize) {
         if !self.in_unread {
@@ -76,7 +76,7 @@ impl Reader {
         }
     }
 
-    fn carry_out(&mut self, command: &DeckCommand, lines: &mut Lines) -> Result<(), String> {
+    fn carry_out(&mut self, command: &DeckCommand, lines: &mut DeckLines) -> Result<(), String> {
         let key = command.key();
         self.in_unread = false;
         if self.is_skipped(command)? {
@@ -110,9 +110,9 @@ impl Reader {
             "CMGR" => self.component_group(command),
             "CMSE" => self.select_component(command),
             "NSEL" => self.select_nodes(command)?,
-            "ALLS" => self.selection = Selection::All,
+            "ALLS" => self.selection = DeckSelection::All,
             "NSLE" | "NSLK" | "NSLL" | "NSLA" | "NSLV" => {
-                self.selection = Selection::Unknown(command.line);
+                self.selection = DeckSelection::Unknown(command.line);
             }
             "D" if !self.solved => self.hold(command)?,
             "CSYS" => self.system(command)?,
@@ -246,8 +246,8 @@ impl Reader {
         } else {
             None
         };
-        let element = Element {
-            origin: Origin::in_line(number.unwrap_or(next), command.line),
+        let element = DeckElement {
+            origin: ElementName::in_line(number.unwrap_or(next), command.line),
             line: command.line,
             kind: self.active.kind,
             material: self.active.material,
@@ -299,7 +299,7 @@ impl Reader {
         if label.is_empty() || label == "USER" {
             return Ok(());
         }
-        let Some(system) = System::of_ansys(label, line) else {
+        let Some(system) = UnitSystem::of_ansys(label, line) else {
             self.soup.notes.push(format!(
                 "line {line} names units that are not known here ({}): mm, cm, m and inches are",
                 quote(label)
@@ -356,9 +356,9 @@ impl Reader {
         let count = self.nodes.len();
         let label = command.label(0);
         match label.as_str() {
-            "ALL" => self.selection = Selection::All,
-            "NONE" => self.selection = Selection::Only([].into()),
-            "INVE" => self.selection = Selection::Unknown(command.line),
+            "ALL" => self.selection = DeckSelection::All,
+            "NONE" => self.selection = DeckSelection::Only([].into()),
+            "INVE" => self.selection = DeckSelection::Unknown(command.line),
             _ => {
                 let known = std::mem::take(&mut self.known);
                 let named = self.node_list().named(command, &known);

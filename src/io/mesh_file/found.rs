@@ -10,7 +10,7 @@ const PSI: f64 = 6_894.757_293_168;
 
 /// A system of units that a file names.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct System {
+pub struct UnitSystem {
     pub length: Unit,
     /// Pa.
     pub stress: f64,
@@ -18,7 +18,7 @@ pub struct System {
     pub line: usize,
 }
 
-impl System {
+impl UnitSystem {
     /// The system by the name that Ansys has for it.
     #[must_use]
     pub fn of_ansys(name: &str, line: usize) -> Option<Self> {
@@ -39,8 +39,8 @@ impl System {
 
 /// What a deck says, in its own units.
 #[derive(Default)]
-pub struct Said {
-    pub system: Option<System>,
+pub struct DeckSaid {
+    pub system: Option<UnitSystem>,
     /// Young's modulus and Poisson's ratio.
     pub material: Option<[f64; 2]>,
     /// Of a shell.
@@ -49,7 +49,7 @@ pub struct Said {
     pub supports: Vec<SupportKeys>,
 }
 
-impl Said {
+impl DeckSaid {
     /// The unit of stress (Pa) where lengths are in one of `scale` metres: the file's own, or that of newtons, or
     /// pounds, on its square.
     fn stress(&self, scale: f64) -> f64 {
@@ -94,7 +94,7 @@ impl Said {
         masks: &Masks,
         solid: bool,
         notes: &mut Vec<String>,
-    ) -> Found {
+    ) -> FoundDeck {
         let material = self.material(scale, notes);
         let (supports, lost): (Vec<_>, Vec<_>) = self.supports.into_iter().partition(|s| {
             let named = s.vertices.as_ref();
@@ -106,7 +106,7 @@ impl Said {
                 plain::count(lost.len(), "support")
             ));
         }
-        Found {
+        FoundDeck {
             unit: self.system.map(|system| system.length),
             material,
             model: solid.then_some(PartModel::Solid),
@@ -118,7 +118,7 @@ impl Said {
 
 /// What a deck says, in the terms of a project.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Found {
+pub struct FoundDeck {
     /// Of its lengths.
     pub unit: Option<Unit>,
     pub material: Option<MaterialKeys>,
@@ -129,7 +129,7 @@ pub struct Found {
     pub supports: Vec<SupportKeys>,
 }
 
-impl Found {
+impl FoundDeck {
     /// Answers the keys that a project leaves out (`is_given` knows the others, as `table.key`); what was taken, as a
     /// sentence without a stop.
     pub fn answer(&self, project: &mut Project, is_given: impl Fn(&str) -> bool) -> Option<String> {
@@ -187,37 +187,37 @@ mod tests {
 
     #[test]
     fn stresses_follow_lengths() {
-        let said = |system| Said {
+        let said = |system| DeckSaid {
             system,
             material: Some([1700.0, 0.4]),
-            ..Said::default()
+            ..DeckSaid::default()
         };
-        let gpa = |said: Said, unit: Unit| {
+        let gpa = |said: DeckSaid, unit: Unit| {
             let mut notes = Vec::new();
             let found = said.material(unit.metres(), &mut notes).unwrap();
             (found.youngs_modulus_gpa, notes.len())
         };
-        let si = System::of_ansys("mks", 3);
+        let si = UnitSystem::of_ansys("mks", 3);
         assert_eq!(gpa(said(None), Unit::Millimetre), (1.7, 0));
         assert_eq!(
-            gpa(said(System::of_ansys("NMM", 1)), Unit::Millimetre),
+            gpa(said(UnitSystem::of_ansys("NMM", 1)), Unit::Millimetre),
             (1.7, 0)
         );
         // Megapascals in a file that says pascals.
         assert_eq!(gpa(said(si), Unit::Metre), (1.7e-6, 1));
-        assert!(System::of_ansys("BFT", 1).is_none());
+        assert!(UnitSystem::of_ansys("BFT", 1).is_none());
     }
 
     #[test]
     fn a_given_key_comes_first() {
-        let found = Found {
+        let found = FoundDeck {
             unit: Some(Unit::Metre),
             material: Some(MaterialKeys {
                 youngs_modulus_gpa: 3.0,
                 poissons_ratio: 0.4,
             }),
             model: Some(PartModel::Solid),
-            ..Found::default()
+            ..FoundDeck::default()
         };
         let mut project = Project::around("part.dat", Some(Unit::Centimetre));
         let said = found.answer(&mut project, |key| key == "material.youngs_modulus_gpa");
@@ -226,6 +226,6 @@ mod tests {
         assert_eq!(project.material.youngs_modulus_gpa, 1.7);
         assert_eq!(project.material.poissons_ratio, 0.4);
         assert!(said.unwrap().contains("0.4"));
-        assert_eq!(Found::default().answer(&mut project, |_| false), None);
+        assert_eq!(FoundDeck::default().answer(&mut project, |_| false), None);
     }
 }

@@ -27,7 +27,7 @@ pub fn read(bytes: &[u8], folder: Option<&Path>) -> Result<Soup, String> {
         .default_scene()
         .or_else(|| document.scenes().next())
         .ok_or("the glTF file has no scene")?;
-    let mut walk = Walk {
+    let mut walk = NodeWalk {
         buffers: &buffers,
         soup: Soup::default(),
         visits: 0,
@@ -85,7 +85,7 @@ fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
 }
 
 /// The way through the nodes of a scene.
-struct Walk<'d> {
+struct NodeWalk<'d> {
     buffers: &'d Buffers,
     soup: Soup,
     /// Nodes walked through.
@@ -97,7 +97,7 @@ struct Walk<'d> {
     skinned: usize,
 }
 
-impl Walk<'_> {
+impl NodeWalk<'_> {
     fn visit(&mut self, node: &gltf::Node, parent: DMat4, depth: usize) -> Result<(), String> {
         const DEEPEST: usize = 64;
         /// Far more than a part needs; a file may name the same node again and again.

@@ -12,12 +12,12 @@ pub type NodeSet = (String, Vec<u32>);
 
 /// Freedoms that are held, by node.
 #[derive(Default)]
-pub struct Held {
+pub struct HeldNodes {
     nodes: BTreeMap<u32, u8>,
 }
 
 /// A way of holding.
-struct Way {
+struct HoldingWay {
     kind: SupportKind,
     normal: Axis,
     /// Freedoms that must be held for it.
@@ -27,13 +27,13 @@ struct Way {
 }
 
 /// A solid has no rotations.
-fn ways(solid: bool) -> Vec<Way> {
+fn ways(solid: bool) -> Vec<HoldingWay> {
     let full = if solid {
         DofSet::DISPLACEMENTS
     } else {
         DofSet::ALL
     };
-    let all = |kind, need: DofSet, name| Way {
+    let all = |kind, need: DofSet, name| HoldingWay {
         kind,
         normal: Axis::Z,
         need: need.0,
@@ -49,7 +49,7 @@ fn ways(solid: bool) -> Vec<Way> {
         (Axis::Z, "held along z"),
     ];
     for (axis, (normal, name)) in axes.into_iter().enumerate() {
-        ways.push(Way {
+        ways.push(HoldingWay {
             kind: SupportKind::Symmetry,
             normal,
             need: DofSet::symmetry(axis).0 & full.0,
@@ -63,7 +63,7 @@ fn fits(held: u8, need: u8) -> bool {
     held & need == need
 }
 
-impl Held {
+impl HeldNodes {
     /// Holds a node, beside what is held of it already.
     pub fn hold(&mut self, node: u32, dofs: DofSet) {
         *self.nodes.entry(node).or_default() |= dofs.0;
@@ -79,7 +79,7 @@ impl Held {
     ) -> Vec<SupportKeys> {
         let ways = ways(solid);
         let supports = ways.iter().filter_map(|way| {
-            let stronger = |w: &&Way| w.need != way.need && fits(w.need, way.need);
+            let stronger = |w: &&HoldingWay| w.need != way.need && fits(w.need, way.need);
             let stronger: Vec<u8> = ways.iter().filter(stronger).map(|w| w.need).collect();
             let is_own =
                 |&held: &u8| fits(held, way.need) && !stronger.iter().any(|&need| fits(held, need));
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn what_is_held_is_said_by_the_sets_of_the_file() {
-        let mut held = Held::default();
+        let mut held = HeldNodes::default();
         for node in [1, 2, 5] {
             held.hold(node, DofSet::of(&[0, 1]));
             held.hold(node, DofSet::of(&[2]));
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_shell_has_rotations() {
-        let mut held = Held::default();
+        let mut held = HeldNodes::default();
         held.hold(1, DofSet::DISPLACEMENTS);
         held.hold(2, DofSet::ALL);
         held.hold(3, DofSet::of(&[0]));

@@ -8,10 +8,10 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::place::{Origin, Place};
-use super::sets::{Numbered, Range, Sets, check_count};
+use super::place::{ElementName, FilePlace};
+use super::sets::{NumberRange, Numbered, Sets, check_count};
 use super::soup::Soup;
-use super::tetrahedra::{Tetrahedra, bounded};
+use super::tetrahedra::{FileTetrahedra, bounded};
 use super::unread::Unread;
 use super::words::{fortran, whole};
 use crate::mesh::volume::Tetrahedron;
@@ -42,7 +42,7 @@ enum Reading {
 }
 
 /// An element of 4 or 10 nodes as its lines have it.
-struct Element {
+struct InpElement {
     line: usize,
     number: u64,
     /// The file's numbers of its nodes.
@@ -71,7 +71,7 @@ const WITH_DATA: [&str; 6] = ["NODE", "ELEMENT", "NSET", "ELSET", "ELASTIC", "BO
 /// A message naming the line.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     let text = String::from_utf8_lossy(bytes);
-    let mut reader = Reader::default();
+    let mut reader = InpReader::default();
     for (line, words) in statements(&text) {
         if words.starts_with('*') {
             reader.begin(&Keyword::of(&words, line))?;
@@ -83,7 +83,7 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
 }
 
 #[derive(Default)]
-struct Reader {
+struct InpReader {
     soup: Soup,
     reading: Reading,
     /// An element that goes on in the next line: where it began, and its number and nodes so far.
@@ -91,7 +91,7 @@ struct Reader {
     /// Places in our lists by the file's numbers.
     node_places: HashMap<u64, u32>,
     element_places: HashMap<u64, u32>,
-    elements: Vec<Element>,
+    elements: Vec<InpElement>,
     node_sets: Sets,
     element_sets: Sets,
     elastic: Elastic,
@@ -102,7 +102,7 @@ struct Reader {
     unread: Unread,
 }
 
-impl Reader {
+impl InpReader {
     fn begin(&mut self, keyword: &Keyword) -> Result<(), String> {
         self.element_is_whole()?;
         self.elastic.notice(keyword);
@@ -218,7 +218,7 @@ impl Reader {
         };
         let tag = whole(tag, line)?;
         let position = DVec3::new(fortran(x, line)?, fortran(y, line)?, fortran(z, line)?);
-        bounded(self.soup.positions.len() as u64 + 1, Place::Line(line))?;
+        bounded(self.soup.positions.len() as u64 + 1, FilePlace::Line(line))?;
         let place = self.soup.positions.len() as u32;
         if self.node_places.insert(tag, place).is_some() {
             return Err(format!(
@@ -260,7 +260,7 @@ impl Reader {
                 self.elements[first as usize].line
             ));
         }
-        self.elements.push(Element {
+        self.elements.push(InpElement {
             line: begun,
             number: tag,
             nodes: numbers,
@@ -318,8 +318,8 @@ impl Reader {
     }
 
     /// The elements on our nodes.
-    fn tetrahedra(&self) -> Result<Tetrahedra, String> {
-        let mut tetrahedra = Tetrahedra::default();
+    fn tetrahedra(&self) -> Result<FileTetrahedra, String> {
+        let mut tetrahedra = FileTetrahedra::default();
         for element in &self.elements {
             let place = |k: usize| self.place_of(element.nodes[k], element.line);
             let mut tetrahedron = Tetrahedron {
@@ -331,7 +331,7 @@ impl Reader {
                     *middle = Some(place(k)?);
                 }
             }
-            let origin = Origin::in_line(element.number, element.line);
+            let origin = ElementName::in_line(element.number, element.line);
             tetrahedra.push(tetrahedron, origin)?;
         }
         Ok(tetrahedra)
@@ -425,7 +425,7 @@ fn add_to(
     Ok(())
 }
 
-fn range(words: &str, line: usize) -> Result<Range, String> {
+fn range(words: &str, line: usize) -> Result<NumberRange, String> {
     let numbers: Vec<u64> = values(words)
         .map(|word| whole(word, line))
         .collect::<Result<_, _>>()?;
@@ -444,5 +444,5 @@ fn range(words: &str, line: usize) -> Result<Range, String> {
             "line {line}: the range from {first} to {last} in steps of {step} is empty"
         ));
     }
-    Ok(Range { first, last, step })
+    Ok(NumberRange { first, last, step })
 }

@@ -11,17 +11,17 @@ use std::collections::hash_map::Entry;
 
 use glam::DVec3;
 
-use super::place::{Origin, Place};
+use super::place::{ElementName, FilePlace};
 use super::sets::check_count;
 use super::soup::Soup;
-use super::tetrahedra::{Tetrahedra, bounded};
+use super::tetrahedra::{FileTetrahedra, bounded};
 use super::words::{listed, number, whole};
 use crate::mesh::volume::Tetrahedron;
 use crate::plain::{lines_before, quote};
-use binary::{Bytes, Piece, pieces};
-use groups::Groups;
-use section::{Record, Section, Sections};
-use stream::{Lines, Stream};
+use binary::{BinarySection, Bytes, pieces};
+use groups::PhysicalGroups;
+use section::{MshSection, RecordWords, Sections};
+use stream::{Stream, TextRecords};
 
 /// What an element is, its corners coming first among its nodes.
 #[derive(Clone, Copy, PartialEq)]
@@ -36,14 +36,14 @@ enum ElementShape {
 
 /// A kind of element.
 #[derive(Clone, Copy)]
-struct Kind {
+struct MshElementKind {
     dimension: u64,
     nodes: usize,
     shape: ElementShape,
 }
 
 /// Elements by Gmsh's numbers of their kinds.
-fn kind(number: u64) -> Option<Kind> {
+fn kind(number: u64) -> Option<MshElementKind> {
     let (dimension, nodes, shape) = match number {
         15 => (0, 1, ElementShape::Outline),
         1 => (1, 2, ElementShape::Outline),
@@ -68,7 +68,7 @@ fn kind(number: u64) -> Option<Kind> {
         19 => (3, 13, ElementShape::Other("pyramid")),
         _ => return None,
     };
-    Some(Kind {
+    Some(MshElementKind {
         dimension,
         nodes,
         shape,
@@ -90,7 +90,7 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     let text = String::from_utf8_lossy(bytes);
     let lines: Vec<&str> = text.lines().collect();
     let mut sections = Sections::of(&lines)?;
-    let mut reader = Reader::default();
+    let mut reader = MshReader::default();
     sections.take("MeshFormat")?;
     let (nodes, elements) = (sections.take("Nodes")?, sections.take("Elements")?);
     if let Some(mut names) = sections.take_any("PhysicalNames")? {
@@ -100,10 +100,10 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     let entities = sections.take_any("Entities")?;
     if version == Version::Fourth {
         if let Some(entities) = entities {
-            reader.groups.read_entities(Lines::of(entities))?;
+            reader.groups.read_entities(TextRecords::of(entities))?;
         }
-        reader.nodes_of_fourth(Lines::of(nodes))?;
-        reader.elements_of_fourth(Lines::of(elements))?;
+        reader.nodes_of_fourth(TextRecords::of(nodes))?;
+        reader.elements_of_fourth(TextRecords::of(elements))?;
     } else {
         reader.nodes_of_second(nodes)?;
         reader.elements_of_second(elements)?;
@@ -115,7 +115,7 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
 /// Reads a binary mesh of version 4.1.
 fn read_binary(bytes: &[u8]) -> Result<Soup, String> {
     let mut pieces = pieces(bytes)?;
-    let mut take = |name: &str| -> Result<Option<Piece>, String> {
+    let mut take = |name: &str| -> Result<Option<BinarySection>, String> {
         let Some(at) = pieces.iter().position(|piece| piece.name == name) else {
             return Ok(None);
         };
@@ -135,13 +135,13 @@ fn read_binary(bytes: &[u8]) -> Result<Soup, String> {
     let elements = take("Elements")?.ok_or_else(|| missing("Elements"))?;
     let (names, entities) = (take("PhysicalNames")?, take("Entities")?);
     let order = format.order()?;
-    let mut reader = Reader::default();
+    let mut reader = MshReader::default();
     if let Some(names) = names {
         let text = String::from_utf8_lossy(names.bytes);
         let first = 1 + lines_before(bytes, names.begins);
         let lines = (first..).zip(text.lines());
         let filled = lines.filter(|(_, text)| !text.trim().is_empty());
-        let records = filled.map(|(line, text)| Record::of(text, line));
+        let records = filled.map(|(line, text)| RecordWords::of(text, line));
         reader.groups.read_names(records)?;
     }
     if let Some(entities) = entities {
@@ -200,37 +200,37 @@ fn version(bytes: &[u8]) -> Result<Version, String> {
 }
 
 #[derive(Default)]
-struct Reader {
+struct MshReader {
     soup: Soup,
     /// The file's numbers of the nodes.
     nodes: HashMap<u64, u32>,
     /// Places of the elements, by the file's numbers of them.
-    elements: HashMap<u64, Place>,
-    tetrahedra: Tetrahedra,
-    groups: Groups,
+    elements: HashMap<u64, FilePlace>,
+    tetrahedra: FileTetrahedra,
+    groups: PhysicalGroups,
     /// Triangles and quadrangles with nodes between their corners, which are left out.
     curved: usize,
 }
 
-impl Reader {
-    fn nodes_of_second(&mut self, mut section: Section) -> Result<(), String> {
+impl MshReader {
+    fn nodes_of_second(&mut self, mut section: MshSection) -> Result<(), String> {
         let count = announced(&mut section, "nodes")?;
-        bounded(count, Place::Line(section.first_line()))?;
+        bounded(count, FilePlace::Line(section.first_line()))?;
         for _ in 0..count {
             let mut record = section.record()?;
             let tag = record.whole()?;
-            let (position, place) = (record.point()?, Place::Line(record.line));
+            let (position, place) = (record.point()?, FilePlace::Line(record.line));
             record.ends()?;
             self.node(tag, position, place)?;
         }
         section.finish(count, "nodes")
     }
 
-    fn elements_of_second(&mut self, mut section: Section) -> Result<(), String> {
+    fn elements_of_second(&mut self, mut section: MshSection) -> Result<(), String> {
         let count = announced(&mut section, "elements")?;
         for _ in 0..count {
             let mut record = section.record()?;
-            let place = Place::Line(record.line);
+            let place = FilePlace::Line(record.line);
             let (tag, kind_number) = (record.whole()?, record.whole()?);
             let tags = record.whole()?;
             // The first is the physical group, none being zero.
@@ -246,7 +246,7 @@ impl Reader {
                 .collect::<Result<_, _>>()?;
             record.ends()?;
             self.groups.add(kind.dimension, group.as_slice(), &nodes);
-            self.take(kind.shape, &nodes, Origin { number: tag, place })?;
+            self.take(kind.shape, &nodes, ElementName { number: tag, place })?;
         }
         section.finish(count, "elements")
     }
@@ -301,7 +301,7 @@ impl Reader {
                     .collect::<Result<_, _>>()?;
                 stream.end()?;
                 self.groups.add(kind.dimension, &groups, &nodes);
-                self.take(kind.shape, &nodes, Origin { number: tag, place })?;
+                self.take(kind.shape, &nodes, ElementName { number: tag, place })?;
             }
             read += in_block;
         }
@@ -309,7 +309,7 @@ impl Reader {
         stream.finish(count, "elements")
     }
 
-    fn node(&mut self, tag: u64, position: DVec3, place: Place) -> Result<(), String> {
+    fn node(&mut self, tag: u64, position: DVec3, place: FilePlace) -> Result<(), String> {
         let number = self.soup.positions.len() as u32;
         if self.nodes.insert(tag, number).is_some() {
             return Err(format!("{place}: node {tag} is there a second time"));
@@ -319,7 +319,7 @@ impl Reader {
     }
 
     /// Refuses an element whose number was there before.
-    fn is_new(&mut self, tag: u64, place: Place) -> Result<(), String> {
+    fn is_new(&mut self, tag: u64, place: FilePlace) -> Result<(), String> {
         match self.elements.entry(tag) {
             Entry::Vacant(free) => {
                 free.insert(place);
@@ -332,12 +332,17 @@ impl Reader {
         }
     }
 
-    fn known(&self, node: u64, place: Place) -> Result<u32, String> {
+    fn known(&self, node: u64, place: FilePlace) -> Result<u32, String> {
         let known = self.nodes.get(&node).copied();
         known.ok_or_else(|| format!("{place}: the element names node {node}, which is not there"))
     }
 
-    fn take(&mut self, shape: ElementShape, nodes: &[u32], origin: Origin) -> Result<(), String> {
+    fn take(
+        &mut self,
+        shape: ElementShape,
+        nodes: &[u32],
+        origin: ElementName,
+    ) -> Result<(), String> {
         let triangles = &mut self.soup.triangles;
         match shape {
             ElementShape::Outline => {}
@@ -394,7 +399,7 @@ impl Reader {
     }
 }
 
-fn known_kind(number: u64, place: Place) -> Result<Kind, String> {
+fn known_kind(number: u64, place: FilePlace) -> Result<MshElementKind, String> {
     kind(number).ok_or_else(|| {
         format!(
             "{place}: elements of Gmsh's kind {number} are not read: mesh the part with elements of first or second order"
@@ -413,7 +418,7 @@ fn tetrahedron(nodes: &[u32]) -> Tetrahedron {
 }
 
 /// The count that a section of version 2 begins with.
-fn announced(section: &mut Section, what: &str) -> Result<u64, String> {
+fn announced(section: &mut MshSection, what: &str) -> Result<u64, String> {
     let mut head = section.record()?;
     let count = head.whole()?;
     section.announced(count, what, head.line)?;

@@ -14,7 +14,7 @@ use crate::plain::{self, quote};
 /// Reads all polygons of a file.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     let text = String::from_utf8_lossy(bytes);
-    let mut reader = Reader::default();
+    let mut reader = ObjReader::default();
     let mut rows = (1..).zip(text.lines());
     while let Some((line, row)) = rows.next() {
         let mut whole = Cow::Borrowed(row);
@@ -36,7 +36,7 @@ fn goes_on(row: &str) -> Option<&str> {
 }
 
 #[derive(Default)]
-struct Reader {
+struct ObjReader {
     soup: Soup,
     /// Name of the group that is being read, and its first triangle.
     group: (String, usize),
@@ -52,7 +52,7 @@ struct Reader {
     unknown: Option<(usize, usize, String)>,
 }
 
-impl Reader {
+impl ObjReader {
     fn statement(&mut self, line: usize, row: &str) -> Result<(), String> {
         let mut words = row.split_whitespace();
         let Some(kind) = words.next() else {

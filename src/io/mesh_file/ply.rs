@@ -8,7 +8,7 @@ mod values;
 
 use glam::DVec3;
 
-use self::header::{Element, Header};
+use self::header::{PlyElement, PlyHeader};
 use self::values::Values;
 use super::soup::Soup;
 use super::words::no_surface;
@@ -16,7 +16,7 @@ use crate::plain::quote;
 
 /// Reads vertices and faces of a file.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
-    let header = Header::read(bytes)?;
+    let header = PlyHeader::read(bytes)?;
     let body = &bytes[header.length..];
     header.check_room(body)?;
     let mut soup = Soup::default();
@@ -58,7 +58,7 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     Ok(soup)
 }
 
-fn read_vertices(element: &Element, values: &mut Values, soup: &mut Soup) -> Result<(), String> {
+fn read_vertices(element: &PlyElement, values: &mut Values, soup: &mut Soup) -> Result<(), String> {
     let column = |axis: &str| {
         let found = element.properties.iter().position(|p| p.name == axis);
         found.filter(|&k| element.properties[k].count.is_none())
@@ -86,14 +86,14 @@ fn read_vertices(element: &Element, values: &mut Values, soup: &mut Soup) -> Res
 }
 
 /// What makes triangles of a list of vertices.
-type Surface<'a> = &'a mut dyn FnMut(&[f64], &mut Vec<[u32; 3]>) -> Result<(), String>;
+type PlySurface<'a> = &'a mut dyn FnMut(&[f64], &mut Vec<[u32; 3]>) -> Result<(), String>;
 
 /// The triangles of the lists of vertices that each of the elements has.
 fn read_faces(
-    element: &Element,
+    element: &PlyElement,
     values: &mut Values,
     soup: &mut Soup,
-    triangles_of: Surface<'_>,
+    triangles_of: PlySurface<'_>,
 ) -> Result<(), String> {
     let corners_of = |name: &str| name == "vertex_indices" || name == "vertex_index";
     let lists = |k: &usize| element.properties[*k].count.is_some();
@@ -153,7 +153,7 @@ fn corner(value: f64, vertices: usize) -> Result<u32, String> {
     ))
 }
 
-fn pass_over(element: &Element, values: &mut Values) -> Result<(), String> {
+fn pass_over(element: &PlyElement, values: &mut Values) -> Result<(), String> {
     for index in 0..element.count {
         values.begin(&element.name, index)?;
         for property in &element.properties {

@@ -7,14 +7,14 @@ use crate::memory;
 
 /// Numbers from one to another in steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
+pub struct NumberRange {
     pub first: u64,
     pub last: u64,
     /// At least one.
     pub step: u64,
 }
 
-impl Range {
+impl NumberRange {
     fn count(&self) -> u64 {
         ((self.last - self.first) / self.step).saturating_add(1)
     }
@@ -41,10 +41,10 @@ impl Range {
 }
 
 /// The same numbers in fewer ranges: those that meet become one.
-fn joined(ranges: &[Range]) -> Vec<Range> {
+fn joined(ranges: &[NumberRange]) -> Vec<NumberRange> {
     let mut sorted = ranges.to_vec();
     sorted.sort_unstable_by_key(|r| (r.step, r.first % r.step, r.first));
-    let mut joined: Vec<Range> = Vec::new();
+    let mut joined: Vec<NumberRange> = Vec::new();
     for range in sorted {
         match joined.last_mut() {
             Some(last) if last.meets(&range) => last.last = last.last.max(range.last),
@@ -85,10 +85,10 @@ impl Numbered {
 
 /// What was said of one set.
 #[derive(Default)]
-pub struct Set {
+pub struct NamedSet {
     pub name: String,
     pub numbers: Vec<u64>,
-    pub ranges: Vec<Range>,
+    pub ranges: Vec<NumberRange>,
     /// Other sets that belong to it.
     pub sets: BTreeSet<usize>,
     /// Of a set of nodes: sets of elements whose nodes belong to it.
@@ -97,7 +97,7 @@ pub struct Set {
 
 /// What a set names.
 #[derive(Default)]
-pub struct Members {
+pub struct SetMembers {
     /// Places in our list, each once, rising.
     pub found: Vec<u32>,
     /// Numbers of what is not there.
@@ -128,7 +128,7 @@ pub fn check_count(sets: usize, nodes: usize) -> Result<(), String> {
 /// Sets by name; capitals make no difference.
 #[derive(Default)]
 pub struct Sets {
-    all: Vec<Set>,
+    all: Vec<NamedSet>,
     places: HashMap<String, usize>,
 }
 
@@ -147,9 +147,9 @@ impl Sets {
     pub fn open(&mut self, name: &str) -> usize {
         let place = self.places.entry(name.to_uppercase());
         *place.or_insert_with(|| {
-            self.all.push(Set {
+            self.all.push(NamedSet {
                 name: name.to_owned(),
-                ..Set::default()
+                ..NamedSet::default()
             });
             self.all.len() - 1
         })
@@ -170,14 +170,14 @@ impl Sets {
     }
 
     /// A set, to add to it.
-    pub fn at(&mut self, set: usize) -> &mut Set {
+    pub fn at(&mut self, set: usize) -> &mut NamedSet {
         &mut self.all[set]
     }
 
     /// What a set and those that belong to it name among the things that are there.
     #[must_use]
-    pub fn members(&self, set: usize, things: &Numbered) -> Members {
-        let mut members = Members::default();
+    pub fn members(&self, set: usize, things: &Numbered) -> SetMembers {
+        let mut members = SetMembers::default();
         for set in self.with_its_sets(set) {
             let set = &self.all[set];
             let before = members.found.len();
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn ranges_cost_what_is_there() {
-        let range = |first, last, step| Range { first, last, step };
+        let range = |first, last, step| NumberRange { first, last, step };
         let mut sets = Sets::default();
         let all = sets.open("all");
         let bombs = (0..100_000).map(|k| range(1 + k % 3, u64::MAX - 1 - k % 5, 1));

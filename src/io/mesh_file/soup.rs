@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::found::Said;
+use super::found::DeckSaid;
 use super::held::NodeSet;
-use super::place::Origin;
+use super::place::ElementName;
 use crate::memory;
 use crate::mesh::volume::VolumeMesh;
 use crate::project::Masks;
@@ -24,11 +24,11 @@ pub(super) struct Soup {
     /// Tetrahedra on the positions: their surface is the mesh, whatever triangles there are.
     pub(super) volume: Option<VolumeMesh>,
     /// Where each of the tetrahedra stands in the file.
-    pub(super) origins: Vec<Origin>,
+    pub(super) origins: Vec<ElementName>,
     /// Positions by name.
     pub(super) node_sets: Vec<NodeSet>,
     /// What it says of the part beside its mesh.
-    pub(super) said: Said,
+    pub(super) said: DeckSaid,
 }
 
 impl Soup {

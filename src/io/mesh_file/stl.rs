@@ -75,7 +75,7 @@ fn binary(triangles: &[u8]) -> Result<Soup, String> {
 
 /// What the next line may be.
 #[derive(Clone, Copy, PartialEq)]
-enum Place {
+enum StlState {
     Outside,
     Solid,
     Facet,
@@ -83,7 +83,7 @@ enum Place {
     EndOfLoop,
 }
 
-impl Place {
+impl StlState {
     fn expects(self) -> &'static str {
         match self {
             Self::Outside => "solid",
@@ -97,7 +97,7 @@ impl Place {
 
 fn text(text: &str) -> Result<Soup, String> {
     let mut soup = Soup::default();
-    let mut place = Place::Outside;
+    let mut place = StlState::Outside;
     // Of the solid that is being read: its name and first triangle.
     let mut solid = (String::new(), 0);
     let mut last = 0;
@@ -107,33 +107,33 @@ fn text(text: &str) -> Result<Soup, String> {
         last = line;
         let is = |keyword: &str| first.eq_ignore_ascii_case(keyword);
         place = match place {
-            Place::Outside if is("solid") => {
+            StlState::Outside if is("solid") => {
                 let name: Vec<&str> = words.collect();
                 solid = (name.join(" "), soup.triangles.len());
-                Place::Solid
+                StlState::Solid
             }
-            Place::Solid if is("endsolid") => {
+            StlState::Solid if is("endsolid") => {
                 soup.group(&solid.0, solid.1);
-                Place::Outside
+                StlState::Outside
             }
-            Place::Solid if is("facet") => Place::Facet,
-            Place::Facet if is("outer") => Place::Loop,
-            Place::Loop if is("vertex") => {
+            StlState::Solid if is("facet") => StlState::Facet,
+            StlState::Facet if is("outer") => StlState::Loop,
+            StlState::Loop if is("vertex") => {
                 soup.positions.push(vertex(words, line)?);
-                Place::Loop
+                StlState::Loop
             }
-            Place::Loop if is("endloop") => {
+            StlState::Loop if is("endloop") => {
                 facet(&mut soup, line)?;
-                Place::EndOfLoop
+                StlState::EndOfLoop
             }
-            Place::EndOfLoop if is("endfacet") => Place::Solid,
+            StlState::EndOfLoop if is("endfacet") => StlState::Solid,
             _ => {
                 let said = format!("{} where {} should be", quote(first), place.expects());
                 return Err(at(line, &said));
             }
         };
     }
-    if place == Place::Outside {
+    if place == StlState::Outside {
         return Ok(soup);
     }
     Err(at(

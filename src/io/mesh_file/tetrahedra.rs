@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-use super::place::{Origin, Place};
+use super::place::{ElementName, FilePlace};
 use super::soup::Soup;
 use crate::memory;
 use crate::mesh::volume::{Tetrahedron, VolumeError, VolumeMesh};
@@ -13,7 +13,7 @@ use crate::plain;
 ///
 /// # Errors
 /// A message naming the place where so many are announced or reached.
-pub fn bounded(nodes: u64, place: Place) -> Result<(), String> {
+pub fn bounded(nodes: u64, place: FilePlace) -> Result<(), String> {
     /// Bytes that the stiffness of a node takes beside its neighbours, before anything is factored.
     const A_NODE: f64 = 1500.0;
     let most = memory::allowed() / A_NODE;
@@ -29,17 +29,17 @@ pub fn bounded(nodes: u64, place: Place) -> Result<(), String> {
 
 /// Tetrahedra on the nodes of a file, none of them twice.
 #[derive(Default)]
-pub struct Tetrahedra {
+pub struct FileTetrahedra {
     all: Vec<Tetrahedron>,
-    origins: Vec<Origin>,
+    origins: Vec<ElementName>,
     /// Which of them has these corners, in rising order.
     known: HashMap<[u32; 4], usize>,
     /// How many were there before, and the place of the first of those.
     repeats: usize,
-    repeated: Option<Place>,
+    repeated: Option<FilePlace>,
 }
 
-impl Tetrahedra {
+impl FileTetrahedra {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
@@ -49,7 +49,7 @@ impl Tetrahedra {
     ///
     /// # Errors
     /// A message naming the place of one with the corners of another, but other nodes between them.
-    pub fn push(&mut self, tetrahedron: Tetrahedron, origin: Origin) -> Result<(), String> {
+    pub fn push(&mut self, tetrahedron: Tetrahedron, origin: ElementName) -> Result<(), String> {
         let mut corners = tetrahedron.corners;
         corners.sort_unstable();
         match self.known.entry(corners) {
@@ -114,7 +114,7 @@ fn middles(tetrahedron: &Tetrahedron) -> [Option<u32>; 6] {
 
 /// What is wrong with a tetrahedron, and where in the file that one stands.
 #[must_use]
-pub fn at_origin(error: &VolumeError, origins: &[Origin]) -> String {
+pub fn at_origin(error: &VolumeError, origins: &[ElementName]) -> String {
     match error.element().and_then(|element| origins.get(element)) {
         Some(origin) => format!("{origin}: {error}"),
         None => error.to_string(),

@@ -29,7 +29,7 @@ pub(super) fn read(
         return Ok(masks);
     }
     let found: Vec<String> = masks.keys().cloned().collect();
-    let arrays = Arrays::beside(path)?;
+    let arrays = MaskFile::beside(path)?;
     for (key, name) in project.mask_keys() {
         let own = plain(name).to_owned();
         // What is not there, or is for another mesh, gives way to the group of that name.
@@ -55,20 +55,20 @@ pub(super) fn read_painted(
     let Some(name) = &project.feasible.painted else {
         return Ok(None);
     };
-    let arrays = Arrays::beside(path)?;
+    let arrays = MaskFile::beside(path)?;
     let mask = arrays.mask("feasible.painted", name, mesh, &[])?;
     Ok(Some(mask))
 }
 
 /// The file of arrays beside a project.
-struct Arrays {
+struct MaskFile {
     project: PathBuf,
     path: PathBuf,
     /// Nothing where there is no such file.
     names: Option<Vec<String>>,
 }
 
-impl Arrays {
+impl MaskFile {
     fn beside(project: &Path) -> Result<Self, FileError> {
         let path = arrays_path(project);
         let names = match source::ordinary(&path) {

@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 use super::*;
 use crate::mesh::unroll::Axis;
 use crate::project::{
-    ChosenSite, CostKeys, Kept, KeptError, KeptFailure, PartAxis, RegionKeys, SupportKeys,
+    ChosenSite, CostKeys, KeptError, KeptFailure, KeptSelection, PartAxis, RegionKeys, SupportKeys,
     SupportKind, Unit,
 };
 
@@ -25,7 +25,7 @@ fn full() -> Project {
     });
     p.part.axis = PartAxis::Along([0.1, 1.0 / 3.0, -2.0]);
     p.candidates.count = Some(407);
-    p.budget.limits = crate::budget::Limits {
+    p.budget.limits = crate::budget::BudgetLimits {
         elements_percent: Some(2.5),
         vertices: Some(1500),
         touches: Some(700),
@@ -72,7 +72,7 @@ fn full() -> Project {
         box_axis: Some([1.0, 0.0, 0.5]),
         cost: 2.5,
     });
-    p.kept.push(Kept {
+    p.kept.push(KeptSelection {
         name: "greedy \"ten\"".into(),
         selector: "by-hand".into(),
         quality: crate::budget::Quality::Draft,

@@ -10,13 +10,13 @@ use crate::io::npz::{Arrays, NpzFile};
 use crate::learning::TouchEstimator;
 use crate::learning::doubt::ErrorModel;
 use crate::learning::estimator::ForceEstimator;
-use crate::learning::inputs::Inputs;
-use crate::learning::machine::{By, Machine};
+use crate::learning::inputs::ChannelScales;
+use crate::learning::machine::{AnswerRule, Regression};
 use crate::regression::Standardizer;
 
 /// Adds what an estimator is made of.
 pub fn add(file: &mut NpzFile, estimator: &TouchEstimator) -> std::io::Result<()> {
-    let Inputs {
+    let ChannelScales {
         middle,
         spread,
         standard,
@@ -39,17 +39,17 @@ pub fn add(file: &mut NpzFile, estimator: &TouchEstimator) -> std::io::Result<()
     Ok(())
 }
 
-fn add_machine(file: &mut NpzFile, of: &str, machine: &Machine) -> std::io::Result<()> {
+fn add_machine(file: &mut NpzFile, of: &str, machine: &Regression) -> std::io::Result<()> {
     let name = |what: &str| format!("{of}_{what}");
     let lengths = &machine.lengths;
     file.add(&name("lengths"), &[lengths.len()], lengths)?;
     add_matrix(file, &name("points"), &machine.points)?;
     match &machine.by {
-        By::Kernel { weights, bias, .. } => {
+        AnswerRule::Kernel { weights, bias, .. } => {
             add_matrix(file, &name("weights"), weights)?;
             file.add(&name("bias"), &[bias.len()], bias)
         }
-        By::Nearest { outputs, .. } => add_matrix(file, &name("outputs"), outputs),
+        AnswerRule::Nearest { outputs, .. } => add_matrix(file, &name("outputs"), outputs),
     }
 }
 
@@ -68,7 +68,7 @@ pub fn read(
     header: &RegressionEntry,
 ) -> Result<TouchEstimator, FileError> {
     let mut from = Checked { path, arrays };
-    let inputs = Inputs {
+    let inputs = ChannelScales {
         middle: from.list("channel_middle", Some(channels))?,
         spread: from.list("channel_spread", Some(channels))?,
         standard: Standardizer {
@@ -138,7 +138,7 @@ impl Checked<'_> {
         entry: &MachineEntry,
         features: usize,
         outputs: usize,
-    ) -> Result<Machine, FileError> {
+    ) -> Result<Regression, FileError> {
         let name = |what: &str| format!("{of}_{what}");
         let lengths = self.list(&name("lengths"), Some(features))?;
         if let Some(length) = lengths.iter().find(|l| **l <= 0.0) {
@@ -150,7 +150,7 @@ impl Checked<'_> {
             return Err(self.broken(&format!("{of} knows no touch")));
         }
         let by = match entry {
-            MachineEntry::Kernel(kernel) => By::Kernel {
+            MachineEntry::Kernel(kernel) => AnswerRule::Kernel {
                 kernel: *kernel,
                 weights: self.matrix(&name("weights"), Some(touches), outputs)?,
                 bias: self.list(&name("bias"), Some(outputs))?,
@@ -158,12 +158,12 @@ impl Checked<'_> {
             MachineEntry::Nearest(0) => {
                 return Err(self.broken(&format!("{of} asks none of the nearest touches")));
             }
-            MachineEntry::Nearest(count) => By::Nearest {
+            MachineEntry::Nearest(count) => AnswerRule::Nearest {
                 outputs: self.matrix(&name("outputs"), Some(touches), outputs)?,
                 count: *count,
             },
         };
-        Ok(Machine {
+        Ok(Regression {
             lengths,
             points,
             by,

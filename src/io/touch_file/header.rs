@@ -4,12 +4,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::{Knowledge, Learned, Outcome};
+use crate::design::{Learned, TaughtKnowledge, TrainingOutcome};
 use crate::io::FileError;
 use crate::io::fingerprint::Fingerprint;
-use crate::learning::machine::{self, Machine};
+use crate::learning::machine::{self, Regression};
 use crate::learning::targets::{Scale, TargetFrame};
-use crate::learning::train::Trial;
+use crate::learning::train::MethodTrial;
 use crate::learning::{Family, Method, Scores, TouchEstimator, kernel::Kernel};
 use crate::plain::quote;
 use crate::study::Data;
@@ -22,30 +22,30 @@ const LONGEST: usize = 1 << 20;
 
 /// What stands in the header.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Header {
+pub struct EstimatorHeader {
     format: String,
     version: u32,
     /// Of the program that wrote it.
     program: String,
     /// What it was trained on, and how well it does.
-    pub origin: Origin,
+    pub origin: TrainingOrigin,
     /// How many channels a reading has.
     pub channels: usize,
     #[serde(flatten)]
-    pub(super) by: By,
+    pub(super) by: EstimatorSection,
 }
 
 /// What answers, beside its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub(super) enum By {
+pub(super) enum EstimatorSection {
     Regression(Box<RegressionEntry>),
     Matching(Box<MatchingEntry>),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct MatchingEntry {
-    pub(super) matching: Knowledge,
+    pub(super) matching: TaughtKnowledge,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,7 +58,7 @@ pub(super) struct RegressionEntry {
 
 /// What an estimator was trained on, and how well it does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Origin {
+pub struct TrainingOrigin {
     /// The name of the file of the data.
     pub data: String,
     /// Key of readings and places.
@@ -74,7 +74,7 @@ pub struct Origin {
     /// Mean error on the touches that it was chosen by (mm).
     pub validation_mm: f64,
     /// What else was tried.
-    pub tried: Vec<Trial>,
+    pub tried: Vec<MethodTrial>,
     /// On touches that nobody learned from.
     pub test: Scores,
     /// The limb, where it is known.
@@ -83,13 +83,13 @@ pub struct Origin {
     pub board: Option<String>,
     /// What it was brought up to date by, the last time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub update: Option<Update>,
+    pub update: Option<UpdateSection>,
 }
 
-impl Origin {
+impl TrainingOrigin {
     /// Of a training with a seed on data of a name; limb and board are not known yet.
     #[must_use]
-    pub fn of(outcome: &Outcome, data: &Data, name: &str, seed: u64) -> Self {
+    pub fn of(outcome: &TrainingOutcome, data: &Data, name: &str, seed: u64) -> Self {
         Self {
             data: name.to_owned(),
             fingerprint: fingerprint(data),
@@ -118,7 +118,7 @@ pub fn fingerprint(data: &Data) -> String {
 
 /// New presses that an estimator was brought up to date by.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Update {
+pub struct UpdateSection {
     /// The name of the file of the data.
     pub data: String,
     /// Key of readings and places.
@@ -165,18 +165,18 @@ struct First {
     version: u32,
 }
 
-impl Header {
-    pub(super) fn new(origin: Origin, estimator: &Learned) -> Self {
+impl EstimatorHeader {
+    pub(super) fn new(origin: TrainingOrigin, estimator: &Learned) -> Self {
         let (version, by) = match estimator {
             Learned::Regression(estimator) => {
                 let entry = RegressionEntry::new(estimator);
-                (VERSIONS[0], By::Regression(Box::new(entry)))
+                (VERSIONS[0], EstimatorSection::Regression(Box::new(entry)))
             }
             Learned::Matching(taught) => {
                 let matching = taught.known;
                 (
                     VERSIONS[1],
-                    By::Matching(Box::new(MatchingEntry { matching })),
+                    EstimatorSection::Matching(Box::new(MatchingEntry { matching })),
                 )
             }
         };
@@ -225,8 +225,8 @@ impl Header {
     /// That frames are frames, and spreads are spreads.
     fn check(&self) -> Result<(), String> {
         match &self.by {
-            By::Regression(entry) => entry.check(),
-            By::Matching(entry) => check_known(&entry.matching),
+            EstimatorSection::Regression(entry) => entry.check(),
+            EstimatorSection::Matching(entry) => check_known(&entry.matching),
         }
     }
 }
@@ -277,7 +277,7 @@ impl RegressionEntry {
     }
 }
 
-fn check_known(known: &Knowledge) -> Result<(), String> {
+fn check_known(known: &TaughtKnowledge) -> Result<(), String> {
     if known.noise <= 0.0 || known.most_force <= 0.0 {
         return Err("readings have no noise, or nobody presses".to_owned());
     }
@@ -311,10 +311,10 @@ impl ForceEntry {
     }
 }
 
-fn entry(machine: &Machine) -> MachineEntry {
+fn entry(machine: &Regression) -> MachineEntry {
     match &machine.by {
-        machine::By::Kernel { kernel, .. } => MachineEntry::Kernel(*kernel),
-        machine::By::Nearest { count, .. } => MachineEntry::Nearest(*count),
+        machine::AnswerRule::Kernel { kernel, .. } => MachineEntry::Kernel(*kernel),
+        machine::AnswerRule::Nearest { count, .. } => MachineEntry::Nearest(*count),
     }
 }
 

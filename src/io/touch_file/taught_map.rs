@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::design::{Knowledge, Taught};
+use crate::design::{Taught, TaughtKnowledge};
 use crate::io::FileError;
 use crate::io::npz::{Arrays, NpzFile};
 use crate::io::response_maps::{self, Maps};
@@ -20,7 +20,7 @@ pub fn read(
     path: &Path,
     arrays: &mut Arrays,
     channels: usize,
-    known: Knowledge,
+    known: TaughtKnowledge,
 ) -> Result<Taught, FileError> {
     let maps = response_maps::read(arrays, 2, channels);
     let sound = |m: &Maps| m.own[1].values().iter().all(|v| *v >= 0.0);

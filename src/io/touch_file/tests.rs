@@ -1,13 +1,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{Origin, TouchFile, read, write};
+use super::{TouchFile, TrainingOrigin, read, write};
 use crate::budget::unwatched;
 use crate::dataset::SignalMatrix;
-use crate::design::{Knowledge, Learned, Outcome, Taught};
+use crate::design::{Learned, Taught, TaughtKnowledge, TrainingOutcome};
 use crate::inference::ResponseMap;
 use crate::io::npz::NpzFile;
-use crate::learning::{Family, Lessons, TrainingRequest, train};
+use crate::learning::{Family, MeasuredTouches, TrainingRequest, train};
 use crate::mesh::TriMesh;
 
 /// Four channels that feel what is near them, on a flat skin, pressed at random.
@@ -27,10 +27,10 @@ fn touched() -> (SignalMatrix, Vec<[f64; 3]>, Vec<f64>) {
     (SignalMatrix::new(120, values.collect()), places, forces)
 }
 
-fn trained(family: Family) -> Outcome {
+fn trained(family: Family) -> TrainingOutcome {
     let (x, places_mm, forces) = touched();
     let groups: Vec<usize> = (0..120).collect();
-    let lessons = Lessons {
+    let lessons = MeasuredTouches {
         x: &x,
         places_mm: &places_mm,
         forces: &forces,
@@ -43,8 +43,8 @@ fn trained(family: Family) -> Outcome {
     train(&lessons, &asked, &unwatched).unwrap().into()
 }
 
-fn origin(trained: &Outcome) -> Origin {
-    Origin {
+fn origin(trained: &TrainingOutcome) -> TrainingOrigin {
+    TrainingOrigin {
         data: "d.npz".into(),
         fingerprint: "00".into(),
         touches: 120,
@@ -106,7 +106,7 @@ fn taught() -> Learned {
         own: Arc::new(map(1e-7, 2.3)),
         tip: Some(Arc::new(map(1e-4, 0.3))),
         axes: Some(Arc::new([0.4, 0.5, 0.6].map(|by| map(1e-5, by)))),
-        known: Knowledge {
+        known: TaughtKnowledge {
             noise: 1e-7,
             relative: 0.01,
             most_force: 60.0,

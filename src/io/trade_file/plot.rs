@@ -4,31 +4,31 @@ use std::fmt::Write as _;
 
 use crate::io::svg::escape;
 use crate::project::Project;
-use crate::trade::{Measured, Point, front};
+use crate::trade::{Measured, TradePoint, front};
 
 /// Of the picture.
 const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 430.0;
 
 /// Error over CPU time, both by their logarithms: all points, and the front as a line of steps.
-pub(super) fn plot(project: &Project, points: &[Point]) -> String {
-    let own = |p: &&Point| p.setting.answers(project);
-    let measured: Vec<(&Point, &Measured)> = (points.iter())
+pub(super) fn plot(project: &Project, points: &[TradePoint]) -> String {
+    let own = |p: &&TradePoint| p.setting.answers(project);
+    let measured: Vec<(&TradePoint, &Measured)> = (points.iter())
         .filter(own)
         .filter_map(|p| Some((p, p.measured()?)))
         .filter(|(_, m)| m.error_mm > 0.0 && m.cpu_seconds > 0.0)
         .collect();
     let best: Vec<&Measured> = front(project, points)
         .into_iter()
-        .filter_map(Point::measured)
+        .filter_map(TradePoint::measured)
         .collect();
     let [x, y] = [
-        Axis::of(
+        LogAxis::of(
             measured.iter().map(|(_, m)| m.cpu_seconds),
             62.0,
             WIDTH - 18.0,
         ),
-        Axis::of(
+        LogAxis::of(
             measured.iter().map(|(_, m)| m.error_mm),
             HEIGHT - 46.0,
             34.0,
@@ -53,7 +53,7 @@ pub(super) fn plot(project: &Project, points: &[Point]) -> String {
 }
 
 /// Lines at round values, with those beside them.
-fn grid(svg: &mut String, x: &Axis, y: &Axis) {
+fn grid(svg: &mut String, x: &LogAxis, y: &LogAxis) {
     for value in x.ticks() {
         let at = x.at(value);
         let _ = write!(
@@ -75,7 +75,7 @@ fn grid(svg: &mut String, x: &Axis, y: &Axis) {
 }
 
 /// One setting; the named qualities with their names.
-fn dot(svg: &mut String, x: &Axis, y: &Axis, point: &Point, m: &Measured) {
+fn dot(svg: &mut String, x: &LogAxis, y: &LogAxis, point: &TradePoint, m: &Measured) {
     let (cx, cy) = (x.at(m.cpu_seconds), y.at(m.error_mm));
     let label = escape(&format!(
         "{:.1} s, {:.2} mm: {}",
@@ -99,7 +99,7 @@ fn dot(svg: &mut String, x: &Axis, y: &Axis, point: &Point, m: &Measured) {
 }
 
 /// The front as a line of steps.
-fn steps(svg: &mut String, x: &Axis, y: &Axis, best: &[&Measured]) {
+fn steps(svg: &mut String, x: &LogAxis, y: &LogAxis, best: &[&Measured]) {
     let mut line = String::new();
     for (k, m) in best.iter().enumerate() {
         let (cx, cy) = (x.at(m.cpu_seconds), y.at(m.error_mm));
@@ -120,14 +120,14 @@ fn steps(svg: &mut String, x: &Axis, y: &Axis, best: &[&Measured]) {
 }
 
 /// A logarithmic axis.
-struct Axis {
+struct LogAxis {
     low: f64,
     high: f64,
     from: f64,
     to: f64,
 }
 
-impl Axis {
+impl LogAxis {
     fn of(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (low, high) = values
             .filter(|v| v.is_finite() && *v > 0.0)

@@ -8,13 +8,13 @@ use glam::DVec3;
 
 use super::timing::Timing;
 use crate::link::counted_line::CountedLine;
-use crate::link::{Address, Held, Port, Recorder, Truths};
-use crate::live::{Pipeline, Receiver, Rest, Sample, Traffic, Unusable, Update};
-use crate::wire::{Hello, Message, encode};
+use crate::link::{Address, HeldConnection, Port, Recorder, Truths};
+use crate::live::{LiveUpdate, Pipeline, Receiver, Rest, Sample, Traffic, Unusable};
+use crate::wire::{Hello, WireMessage, encode};
 
 /// How the connection stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum State {
+pub enum ConnectionState {
     /// The port is open; nothing was understood yet.
     Waiting,
     Live,
@@ -28,11 +28,11 @@ pub enum State {
 
 /// What is reported while listening.
 pub enum SessionEvent<'a> {
-    State(&'a State),
+    State(&'a ConnectionState),
     Hello(&'a Hello),
     Sample {
         sample: &'a Sample,
-        update: &'a Update,
+        update: &'a LiveUpdate,
         pipeline: &'a Pipeline,
     },
     /// Where a simulated board is really touched (m, N).
@@ -66,7 +66,7 @@ pub enum ListenerCommand {
 pub struct Listener {
     pub(super) address: Address,
     /// The connection to it, where it is open already.
-    pub(super) held: Option<Held>,
+    pub(super) held: Option<HeldConnection>,
     pub(super) pipeline: Pipeline,
     pub(super) receiver: Receiver,
     pub(super) recorder: Option<Recorder>,
@@ -77,7 +77,7 @@ pub struct Listener {
     /// The USB device at the port, as [`crate::link::PortInfo::identity`].
     pub(super) device: Option<String>,
     pub(super) rate: Option<u16>,
-    pub(super) state: State,
+    pub(super) state: ConnectionState,
     /// When the last sample came, or the port was opened.
     pub(super) last_arrival: Instant,
     /// Why nothing can be used, as far as it was told.
@@ -108,7 +108,7 @@ impl Listener {
             hello: None,
             device: None,
             rate: None,
-            state: State::Waiting,
+            state: ConnectionState::Waiting,
             last_arrival: Instant::now(),
             explained: Vec::new(),
             compared: None,
@@ -130,7 +130,7 @@ impl Listener {
 
     /// Goes on with a connection that is open already.
     #[must_use]
-    pub fn holding(mut self, held: Option<Held>) -> Self {
+    pub fn holding(mut self, held: Option<HeldConnection>) -> Self {
         self.begun = held.as_ref().map_or(self.begun, |held| held.since);
         self.held = held;
         self
@@ -150,12 +150,12 @@ impl Listener {
         self
     }
 
-    pub(super) fn enter(&mut self, state: State, tell: &mut impl FnMut(SessionEvent)) {
+    pub(super) fn enter(&mut self, state: ConnectionState, tell: &mut impl FnMut(SessionEvent)) {
         self.state = state;
         tell(SessionEvent::State(&self.state));
     }
 
-    pub(super) fn say(&mut self, port: &mut dyn Port, message: &Message) {
+    pub(super) fn say(&mut self, port: &mut dyn Port, message: &WireMessage) {
         let mut bytes = Vec::new();
         encode(
             message,

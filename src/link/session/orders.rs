@@ -2,7 +2,7 @@
 
 use super::listener::{Listener, ListenerCommand, SessionEvent};
 use crate::link::{Port, Recorder};
-use crate::wire::Message;
+use crate::wire::WireMessage;
 
 impl Listener {
     pub(super) fn turn(&mut self, tell: &mut impl FnMut(SessionEvent)) {
@@ -29,7 +29,7 @@ impl Listener {
             }
             ListenerCommand::Rate(hertz) => {
                 self.rate = Some(hertz);
-                self.say(port, &Message::Rate(hertz));
+                self.say(port, &WireMessage::Rate(hertz));
             }
             ListenerCommand::Record(path) => match Recorder::create(&path) {
                 Ok(recorder) => {

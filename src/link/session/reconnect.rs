@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::listener::{Listener, ListenerCommand, SessionEvent};
 use crate::link::{Address, Got, Port, PortInfo, ports};
 use crate::live::{Input, Receiver};
-use crate::wire::Message;
+use crate::wire::WireMessage;
 
 /// Between two tries.
 const AGAIN: Duration = Duration::from_millis(150);
@@ -78,7 +78,7 @@ impl Listener {
 
     /// Which board it is.
     fn asks(&mut self, port: &mut dyn Port) -> Option<u32> {
-        self.say(port, &Message::AskHello);
+        self.say(port, &WireMessage::AskHello);
         let (begun, mut receiver, mut buffer) = (Instant::now(), Receiver::default(), [0; 4096]);
         let mut found = None;
         while found.is_none() && begun.elapsed() < WHO {

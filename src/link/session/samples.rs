@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::listener::{Listener, SessionEvent, State};
+use super::listener::{ConnectionState, Listener, SessionEvent};
 use crate::live::{Sample, Unusable};
 
 impl Listener {
@@ -65,8 +65,8 @@ impl Listener {
         tell: &mut impl FnMut(SessionEvent),
     ) {
         self.measured += 1;
-        if self.state != State::Live {
-            self.enter(State::Live, tell);
+        if self.state != ConnectionState::Live {
+            self.enter(ConnectionState::Live, tell);
         }
         if self.pipeline.rest().is_none() && !self.pipeline.is_taring() {
             self.pipeline.tare();

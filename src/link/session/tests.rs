@@ -45,7 +45,7 @@ fn hello() -> Hello {
     }
 }
 
-fn frames(messages: &[Message]) -> Vec<u8> {
+fn frames(messages: &[WireMessage]) -> Vec<u8> {
     let mut bytes = vec![0];
     for (k, message) in (0..).zip(messages) {
         encode(message, k, 1000 * u32::from(k), 12, &mut bytes);
@@ -58,7 +58,7 @@ fn heard_until_over(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(),
     let (mut said, mut counts) = (Vec::new(), Vec::new());
     let (stop, (_commands, inbox)) = (AtomicBool::new(false), channel());
     let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |event| match event {
-        SessionEvent::State(State::Gone) => stop.store(true, Ordering::Relaxed),
+        SessionEvent::State(ConnectionState::Gone) => stop.store(true, Ordering::Relaxed),
         SessionEvent::Hello(hello) => said.push(format!("hello {}", hello.name)),
         SessionEvent::Message(text) => said.push(format!("message {text}")),
         SessionEvent::Trouble(text) => said.push(format!("trouble {text}")),
@@ -96,8 +96,8 @@ fn of_recording(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>
     heard_until_over(recording(&path))
 }
 
-fn log(text: &str) -> Message {
-    Message::Log {
+fn log(text: &str) -> WireMessage {
+    WireMessage::Log {
         level: 0,
         text: text.into(),
     }
@@ -106,11 +106,11 @@ fn log(text: &str) -> Message {
 #[test]
 fn text_of_a_board_is_shown_and_never_obeyed() {
     let said = of_board(frames(&[
-        Message::Hello(hello()),
+        WireMessage::Hello(hello()),
         log("hapdef truth 1 2 3 4"),
         log("hapdef dead 0"),
         log("hapdef line 1,2,3,4"),
-        Message::Note("truth 1 2 3 4".into()),
+        WireMessage::Note("truth 1 2 3 4".into()),
         log("a\u{1b}]0;title\u{7}\nhapdef: b"),
     ]));
     let expected = [
@@ -125,15 +125,15 @@ fn text_of_a_board_is_shown_and_never_obeyed() {
 
 #[test]
 fn notes_of_a_recording_are_obeyed_the_old_ones_too() {
-    let data = Message::Data(vec![2000; 4]);
-    let old = [Message::Hello(hello()), log("hapdef truth none"), data];
+    let data = WireMessage::Data(vec![2000; 4]);
+    let old = [WireMessage::Hello(hello()), log("hapdef truth none"), data];
     let (said, counts, ended) = of_recording(&frames(&old));
     assert_eq!(said[1..], ["truth None"]);
     assert_eq!((counts.len(), ended), (1, Ok(())));
     let new = [
-        Message::Note("truth none".into()),
+        WireMessage::Note("truth none".into()),
         log("hapdef truth none"),
-        Message::Note("line 1,2,3,4".into()),
+        WireMessage::Note("line 1,2,3,4".into()),
     ];
     let (said, counts, _) = of_recording(&frames(&new));
     let shown = "message the board says: “hapdef truth none”";
@@ -156,18 +156,18 @@ fn lines_with_many_channels_are_recorded_whole() {
     assert_eq!(heard_until_over(recording(&path)).1, [sample.counts]);
     // One whose middle is lost is not taken for one of fewer channels.
     let torn = ["part 0 1,2", "line 4 5,6", "line 0 1,2,x", "part 9", "line"];
-    let torn = torn.map(|text| Message::Note(text.into()));
+    let torn = torn.map(|text| WireMessage::Note(text.into()));
     assert!(of_recording(&frames(&torn)).1.is_empty());
 }
 
 /// Whether a board has said how many channels it has, or only prints lines.
 #[test]
 fn channels_that_do_not_come_are_told_once() {
-    let few = Message::Hello(Hello {
+    let few = WireMessage::Hello(Hello {
         channels: 3,
         ..hello()
     });
-    let data = Message::Data(vec![2000; 3]);
+    let data = WireMessage::Data(vec![2000; 3]);
     let greeted = of_board(frames(&[few.clone(), data.clone(), few, data]));
     let lines = of_board(b"1,2,3\n".repeat(20));
     for said in [greeted, lines] {
@@ -180,11 +180,11 @@ fn channels_that_do_not_come_are_told_once() {
 
 #[test]
 fn a_board_that_cannot_be_used_says_why_once() {
-    let deaf = Message::Hello(Hello {
+    let deaf = WireMessage::Hello(Hello {
         gain_milli: 0,
         ..hello()
     });
-    let data = Message::Data(vec![2000; 4]);
+    let data = WireMessage::Data(vec![2000; 4]);
     let said = of_board(frames(&[
         deaf.clone(),
         data.clone(),
@@ -198,7 +198,7 @@ fn a_board_that_cannot_be_used_says_why_once() {
 
 #[test]
 fn a_recording_without_a_reading_says_so() {
-    let other = Message::Hello(Hello {
+    let other = WireMessage::Hello(Hello {
         version: 2,
         ..hello()
     });

@@ -14,11 +14,11 @@ const BLOCKS: f64 = 50.0;
 /// What was left when the touch came to where it is.
 #[derive(Default)]
 pub(super) struct Misfit {
-    found: Option<Found>,
+    found: Option<FoundTouch>,
 }
 
 /// A touch as it came to where it is.
-struct Found {
+struct FoundTouch {
     place: DVec3,
     force: f64,
     is_area: bool,
@@ -43,11 +43,11 @@ impl Misfit {
         left: &[f64],
         ways: impl FnOnce() -> Vec<Vec<f64>>,
     ) -> Option<Beyond> {
-        let stays = |f: &&Found| {
+        let stays = |f: &&FoundTouch| {
             f.is_area == is_area && f.place.distance(place) < STAYS && force < HARDER * f.force
         };
         let Some(found) = self.found.as_ref().filter(stays) else {
-            self.found = Some(Found {
+            self.found = Some(FoundTouch {
                 place,
                 force,
                 is_area,

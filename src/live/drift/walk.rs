@@ -29,7 +29,7 @@ const SHOWN: f64 = 0.4e-6;
 const WINDOWS: f64 = 400.0;
 
 /// Steps of the rest in a second, and how steadily it drifts.
-pub(super) struct Walk {
+pub(super) struct RestWalk {
     /// q² of each channel (strain² a second).
     own: Vec<f64>,
     least_own: Vec<f64>,
@@ -47,7 +47,7 @@ pub(super) struct Walk {
     walked: Vec<f64>,
 }
 
-impl Walk {
+impl RestWalk {
     /// A channel of this noise (strain) at a rate (Hz) is followed within some seconds at rest, and drifts (strain a
     /// second) as it did while the tare was taken.
     pub fn new(noise: &[f64], drift: &[f64], follows_s: f64, rate: f64) -> Self {

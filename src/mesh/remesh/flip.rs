@@ -65,7 +65,7 @@ pub(super) fn flip(work: &mut Working) {
 }
 
 /// What is to be done with an edge.
-enum Verdict {
+enum FlipVerdict {
     Stays,
     /// It would be turned if what it would be turned to were not there already.
     Barred,
@@ -81,11 +81,11 @@ fn look(work: &mut Working, (a, b): (u32, u32), queue: &mut Queue) {
         return;
     };
     match verdict(work, [a, b], on) {
-        Verdict::Stays => {}
-        Verdict::Barred => {
+        FlipVerdict::Stays => {}
+        FlipVerdict::Barred => {
             queue.next.insert((a, b));
         }
-        Verdict::Turns(on, [c, d]) => {
+        FlipVerdict::Turns(on, [c, d]) => {
             work.flip(a, b, on, [c, d]);
             queue.made(key(c, d));
             for beside in [key(a, c), key(c, b), key(b, d), key(d, a)] {
@@ -95,27 +95,27 @@ fn look(work: &mut Working, (a, b): (u32, u32), queue: &mut Queue) {
     }
 }
 
-fn verdict(work: &Working, [a, b]: [u32; 2], [s, t]: [u32; 2]) -> Verdict {
+fn verdict(work: &Working, [a, b]: [u32; 2], [s, t]: [u32; 2]) -> FlipVerdict {
     let opposite = |t: u32| {
         let mut corners = work.triangles[t as usize].into_iter();
         corners.find(|&v| v != a && v != b)
     };
     let (Some(c), Some(d)) = (opposite(s), opposite(t)) else {
-        return Verdict::Stays;
+        return FlipVerdict::Stays;
     };
     let [pa, pb, pc, pd] = [a, b, c, d].map(|v| work.position(v));
     // Two angles of at most a quarter turn need no arc cosine.
     let is_sharp = |at: DVec3| (pa - at).dot(pb - at) >= 0.0;
     if c == d || (is_sharp(pc) && is_sharp(pd)) {
-        return Verdict::Stays;
+        return FlipVerdict::Stays;
     }
     let angle = |at: DVec3| (pa - at).angle_between(pb - at);
     // Delaunay on the surface: opposite angles of more than half a turn.
     if angle(pc) + angle(pd) <= std::f64::consts::PI + LEVEL {
-        return Verdict::Stays;
+        return FlipVerdict::Stays;
     }
     if work.is_edge(c, d) {
-        return Verdict::Barred;
+        return FlipVerdict::Barred;
     }
     let (n, m) = (work.normal(s), work.normal(t));
     let mean = n + m;
@@ -130,9 +130,9 @@ fn verdict(work: &Working, [a, b]: [u32; 2], [s, t]: [u32; 2]) -> Verdict {
     let sound = |new: DVec3| new.dot(mean) > 0.5 * new.length() * mean.length();
     let size = mean.length();
     if !sound(first) || !sound(second) || first.length().min(second.length()) < 1e-6 * size {
-        return Verdict::Stays;
+        return FlipVerdict::Stays;
     }
-    Verdict::Turns([s, t], [c, d])
+    FlipVerdict::Turns([s, t], [c, d])
 }
 
 #[cfg(test)]

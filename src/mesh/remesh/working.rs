@@ -13,7 +13,7 @@ const GONE: [u32; 3] = [u32::MAX; 3];
 
 /// A vertex on its way.
 #[derive(Clone, Copy, Debug)]
-pub struct Vertex {
+pub struct WorkingVertex {
     /// Where it is (m).
     pub position: DVec3,
     /// Where on the surface.
@@ -29,7 +29,7 @@ pub struct Working<'s> {
     /// What vertices are projected onto.
     pub surface: &'s Surface,
     /// Those that were collapsed keep their numbers, without triangles.
-    pub vertices: Vec<Vertex>,
+    pub vertices: Vec<WorkingVertex>,
     /// Corners of each triangle; see [`Working::is_gone`].
     pub triangles: Vec<[u32; 3]>,
     /// Triangles round each vertex.
@@ -50,7 +50,7 @@ impl<'s> Working<'s> {
         let vertices = (0..mesh.positions().len() as u32)
             .map(|v| {
                 let position = mesh.positions()[v as usize];
-                Vertex {
+                WorkingVertex {
                     position,
                     at: surface.vertex(v).unwrap_or(SurfacePoint {
                         triangle: 0,
@@ -172,7 +172,7 @@ impl<'s> Working<'s> {
         let near = placed.distance(middle) < 0.3 * self.length(a, b);
         let position = if near { placed } else { middle };
         let m = self.vertices.len() as u32;
-        self.vertices.push(Vertex {
+        self.vertices.push(WorkingVertex {
             position,
             at,
             mobility: if line { Mobility::Line } else { Mobility::Free },

@@ -40,7 +40,7 @@ impl Straightened {
         })
     }
 
-    fn add(&mut self, bend: &Bend) {
+    fn add(&mut self, bend: &BentEdge) {
         self.edges += 1;
         if bend.shift > self.largest {
             (self.largest, self.place) = (bend.shift, bend.from);
@@ -49,7 +49,7 @@ impl Straightened {
 }
 
 /// An edge that is not straight.
-struct Bend {
+struct BentEdge {
     /// Its node, where that is and where it would be (m).
     node: u32,
     from: DVec3,
@@ -93,7 +93,7 @@ impl VolumeMesh {
         &self,
         elements: &[usize],
         most: f64,
-    ) -> Result<BTreeMap<u32, Bend>, VolumeError> {
+    ) -> Result<BTreeMap<u32, BentEdge>, VolumeError> {
         let mut bends = BTreeMap::new();
         for &element in elements {
             let Some(bend) = self.worst_bend(element) else {
@@ -114,14 +114,14 @@ impl VolumeMesh {
 
     /// The bent edge without whose bend the tetrahedron has most volume where it has least; nothing where all are
     /// straight.
-    fn worst_bend(&self, element: usize) -> Option<Bend> {
+    fn worst_bend(&self, element: usize) -> Option<BentEdge> {
         let tet = self.tetrahedra[element];
         let p = tet.map(|n| self.nodes[n as usize]);
         let bends = EDGES.iter().enumerate().filter_map(|(k, &[a, b])| {
             let (from, to) = (p[4 + k], (p[a] + p[b]) / 2.0);
             let mut mended = p;
             mended[4 + k] = to;
-            let bend = Bend {
+            let bend = BentEdge {
                 node: tet[4 + k],
                 from,
                 to,

@@ -20,21 +20,21 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use self::filters::{
-    FORCE, Filters, Lane, Thought, correct, corrections, predict, shrink, sum_masses_with,
+    FORCE, Lane, PlaceFilters, Thought, correct, corrections, predict, shrink, sum_masses_with,
 };
 pub(super) use self::filters::{MOST, PLAIN};
 use self::single::Single;
-use self::truth::{Read, TrueFilters};
+use self::truth::{SiteReading, TrueFilters};
 pub(super) use self::unknowns::{Unknowns, prior, row};
 use super::elliptic::mean_length;
-use super::scene::{LANES, Place, Scene};
+use super::scene::{LANES, ScenePlace, TouchScene};
 
 /// Added to the cost of a place that a press already stands for.
 const NEVER: f32 = 1e30;
 
 /// One press.
 #[derive(Clone)]
-struct Press {
+struct BankPress {
     /// Where each place thinks the touch is from its middle (mm, mm), how hard it was (N) and what else there is to
     /// find, block of places by block; and its cost.
     estimates: Vec<Lane>,
@@ -48,22 +48,22 @@ struct Press {
 const TILE: usize = 8;
 
 /// Working memory of whoever tries gauges.
-pub(super) struct Rows(Vec<Tried>);
+pub(super) struct TrialMemory(Vec<TriedGauge>);
 
 /// What a gauge does to the filters at all places, for one force, and to those at the true places.
-struct Tried {
-    places: filters::Rows,
-    read: Read,
+struct TriedGauge {
+    places: filters::FilterRows,
+    read: SiteReading,
 }
 
 /// All presses of a scene, read by the gauges of a set.
 #[derive(Clone)]
 pub(super) struct Bank<'a> {
-    scene: &'a Scene,
+    scene: &'a TouchScene,
     /// Of the places.
     positions: Vec<[Lane; 3]>,
-    filters: Vec<Filters>,
-    presses: Vec<Press>,
+    filters: Vec<PlaceFilters>,
+    presses: Vec<BankPress>,
     truth: TrueFilters,
     mass: f64,
     /// How many there are.
@@ -72,11 +72,11 @@ pub(super) struct Bank<'a> {
 
 impl<'a> Bank<'a> {
     /// No gauge yet.
-    pub fn new(scene: &'a Scene) -> Self {
+    pub fn new(scene: &'a TouchScene) -> Self {
         // Any force up to the hardest; or the one there is.
         let (mean, deviation) = scene.hardest.map_or((1.0, 0.0), |hardest| (0.0, hardest));
         let blocks = scene.places.len().div_ceil(LANES);
-        let padded = |value: &dyn Fn(&Place) -> f64, rest: f32| -> Vec<Lane> {
+        let padded = |value: &dyn Fn(&ScenePlace) -> f64, rest: f32| -> Vec<Lane> {
             let mut values = vec![[rest; LANES]; blocks];
             for (lane, place) in values.as_flattened_mut().iter_mut().zip(&scene.places) {
                 *lane = value(place) as f32;
@@ -85,7 +85,7 @@ impl<'a> Bank<'a> {
         };
         let unknowns = PLAIN + scene.unknowns.len();
         let reaches = padded(&|p| p.reach, 1.0);
-        let filters = || Filters::new(scene, &reaches, (deviation * deviation) as f32);
+        let filters = || PlaceFilters::new(scene, &reaches, (deviation * deviation) as f32);
         // The same for all presses: there are hundreds of them, and a hand waits for this.
         let unlikely = padded(&|p| -p.mass.max(1e-12).ln(), NEVER);
         let mut thought = vec![[0.0; LANES]; unknowns * blocks];
@@ -97,7 +97,7 @@ impl<'a> Bank<'a> {
             for &own in &around.own {
                 costs.as_flattened_mut()[own as usize] = NEVER;
             }
-            Press {
+            BankPress {
                 estimates: thought.clone(),
                 costs,
                 blocks: (0..blocks as u32).collect(),
@@ -116,13 +116,13 @@ impl<'a> Bank<'a> {
     }
 
     /// With the gauges of a set.
-    pub fn of(scene: &'a Scene, sites: &[usize]) -> Self {
+    pub fn of(scene: &'a TouchScene, sites: &[usize]) -> Self {
         Self::seated(scene, sites.iter().copied().enumerate())
     }
 
     /// With gauges at some sites, each in a turn of its own (turn, site): where some of a set are lost, the others
     /// hear the noise that they heard with them.
-    pub fn seated(scene: &'a Scene, seats: impl IntoIterator<Item = (usize, usize)>) -> Self {
+    pub fn seated(scene: &'a TouchScene, seats: impl IntoIterator<Item = (usize, usize)>) -> Self {
         let mut bank = Self::new(scene);
         for (turn, site) in seats {
             bank.take_turn(turn);
@@ -132,14 +132,14 @@ impl<'a> Bank<'a> {
     }
 
     /// Working memory of [`Self::with`].
-    pub fn rows(&self) -> Rows {
-        Rows((0..TILE).map(|_| self.tried()).collect())
+    pub fn rows(&self) -> TrialMemory {
+        TrialMemory((0..TILE).map(|_| self.tried()).collect())
     }
 
-    fn tried(&self) -> Tried {
-        Tried {
+    fn tried(&self) -> TriedGauge {
+        TriedGauge {
             places: self.filters[0].rows(),
-            read: Read::default(),
+            read: SiteReading::default(),
         }
     }
 
@@ -178,7 +178,7 @@ impl<'a> Bank<'a> {
     }
 
     /// The expected error (mm) of the set with one more gauge, at each of some sites.
-    pub fn with(&self, sites: &[usize], rows: &mut Rows) -> Vec<f64> {
+    pub fn with(&self, sites: &[usize], rows: &mut TrialMemory) -> Vec<f64> {
         let mut sums = vec![0.0; sites.len()];
         self.each_with(sites, rows, |which, press, error| {
             sums[which] += self.scene.presses[press].mass * error;
@@ -189,7 +189,7 @@ impl<'a> Bank<'a> {
     /// Expected error (mm) of each press with one more gauge.
     pub(super) fn errors_with(&self, site: usize) -> Vec<f64> {
         let mut errors = vec![0.0; self.presses.len()];
-        let mut rows = Rows(vec![self.tried()]);
+        let mut rows = TrialMemory(vec![self.tried()]);
         self.each_with(&[site], &mut rows, |_, press, error| errors[press] = error);
         errors
     }
@@ -198,7 +198,7 @@ impl<'a> Bank<'a> {
     fn each_with(
         &self,
         sites: &[usize],
-        Rows(rows): &mut Rows,
+        TrialMemory(rows): &mut TrialMemory,
         mut told: impl FnMut(usize, usize, f64),
     ) {
         let scene = self.scene;
@@ -222,7 +222,7 @@ impl<'a> Bank<'a> {
     }
 
     /// Expected error (mm) of a press with a gauge that is tried.
-    fn error_with(&self, press: usize, Tried { places, read }: &Tried) -> f64 {
+    fn error_with(&self, press: usize, TriedGauge { places, read }: &TriedGauge) -> f64 {
         let (reading, cost) = (read.readings[press], read.costs[press]);
         let total = self.masses_with(press, places, reading, cost);
         self.error_of(press, read.lengths[press], total)
@@ -230,7 +230,7 @@ impl<'a> Bank<'a> {
 
     /// Adds a gauge.
     pub fn add(&mut self, site: usize) {
-        let Tried {
+        let TriedGauge {
             mut places,
             mut read,
         } = self.tried();
@@ -253,7 +253,13 @@ impl<'a> Bank<'a> {
     }
 
     /// The probability of all places over that of the true one of a press, which costs `own`, and its first moments.
-    fn masses_with(&self, press: usize, rows: &filters::Rows, reading: f32, own: f32) -> [f64; 4] {
+    fn masses_with(
+        &self,
+        press: usize,
+        rows: &filters::FilterRows,
+        reading: f32,
+        own: f32,
+    ) -> [f64; 4] {
         let press = &self.presses[press];
         let thought = Thought {
             estimates: &press.estimates,
@@ -280,7 +286,7 @@ impl<'a> Bank<'a> {
 
     /// What each place costs (minus the logarithm of its probability, up to what is the same for all) when the gauges
     /// of a set read a press of some force (N) without noise.
-    pub(super) fn costs(scene: &Scene, set: &[usize], press: usize, force: f64) -> Vec<f64> {
+    pub(super) fn costs(scene: &TouchScene, set: &[usize], press: usize, force: f64) -> Vec<f64> {
         let places = scene.places.iter();
         let mut filters: Vec<Single> = places.map(|p| Single::at_rest(scene, p)).collect();
         for &site in set {
@@ -294,9 +300,9 @@ impl<'a> Bank<'a> {
     }
 }
 
-impl Press {
+impl BankPress {
     /// Takes a reading into account at all places that may still be meant.
-    fn correct(&mut self, rows: &filters::Rows, gains: &[Lane], reading: f32) {
+    fn correct(&mut self, rows: &filters::FilterRows, gains: &[Lane], reading: f32) {
         let Self {
             estimates,
             costs,

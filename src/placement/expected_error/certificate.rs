@@ -34,7 +34,7 @@ use serde::Serialize;
 
 use super::bank::{Bank, MOST, PLAIN, Unknowns, prior, row};
 use super::elliptic::mean_length_and_slope;
-use super::scene::Scene;
+use super::scene::TouchScene;
 use crate::budget::{Cancelled, Watch, report};
 
 /// The bound is sought until it is known to this share.
@@ -114,7 +114,7 @@ impl Certificate {
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn certify(
-    scene: &Scene,
+    scene: &TouchScene,
     allowed: &[usize],
     required: &[usize],
     chosen: &[usize],
@@ -141,7 +141,7 @@ pub fn certify(
 
 /// The certificate of the sites `own`, beside those that are `held` in any case, with so many unknowns of a press.
 fn bounded<const N: usize>(
-    scene: &Scene,
+    scene: &TouchScene,
     free: &[usize],
     (held, own): (&[usize], &[usize]),
     watch: Watch,
@@ -172,7 +172,7 @@ struct Relaxed<const N: usize> {
 }
 
 /// What weights come to.
-struct Expected<const N: usize> {
+struct ExpectedBound<const N: usize> {
     /// The error (mm).
     mm: f64,
     /// For each press the matrix H with which a row r, as its weight grows, takes rᵀHr from the error.
@@ -181,7 +181,7 @@ struct Expected<const N: usize> {
 
 impl<const N: usize> Relaxed<N> {
     /// With the sites that are `free`, and those that are `held` in any case.
-    fn new(scene: &Scene, free: &[usize], held: &[usize]) -> Self {
+    fn new(scene: &TouchScene, free: &[usize], held: &[usize]) -> Self {
         let mut made = Unknowns::repeat(1.0);
         // Which unknowns are looked at.
         let mut which: Vec<usize> = (0..PLAIN).collect();
@@ -246,9 +246,9 @@ impl<const N: usize> Relaxed<N> {
     }
 
     /// What weights come to; nothing where numbers fail.
-    fn expected(&self, weights: &[f64]) -> Option<Expected<N>> {
+    fn expected(&self, weights: &[f64]) -> Option<ExpectedBound<N>> {
         let informed = self.informed(weights);
-        let mut expected = Expected {
+        let mut expected = ExpectedBound {
             mm: 0.0,
             slopes: Vec::with_capacity(self.presses),
         };
@@ -281,7 +281,7 @@ impl<const N: usize> Relaxed<N> {
     }
 
     /// By how much the error falls (mm) as the weight of each site grows, over what it grows by.
-    fn worths(&self, expected: &Expected<N>) -> Vec<f64> {
+    fn worths(&self, expected: &ExpectedBound<N>) -> Vec<f64> {
         let worth = |rows: &[[f32; N]]| -> f64 {
             let pairs = rows.iter().zip(&expected.slopes);
             pairs
@@ -339,13 +339,13 @@ fn shared_out(wanted: &[f64], count: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Detail, Forces, Knowledge, Variance, local};
+    use super::super::{Detail, SceneForces, SignalKnowledge, Variance, local};
     use super::*;
     use crate::budget::unwatched;
     use crate::dataset::SignalMatrix;
 
     /// Sites that feel touches on a plane, each in its own way; of 10 N each where forces are known.
-    fn scene(sites: usize, with_forces: bool) -> Scene {
+    fn scene(sites: usize, with_forces: bool) -> TouchScene {
         const SIDE: usize = 6;
         let touch = |t: usize| [(t % SIDE) as f64 * 7.0, (t / SIDE) as f64 * 7.0, 0.0];
         let targets: Vec<[f64; 3]> = (0..SIDE * SIDE).map(touch).collect();
@@ -358,13 +358,13 @@ mod tests {
             .collect();
         let forces = vec![10.0; targets.len()];
         let variance: Variance = &|site: usize, touch: usize| 1e-3 * ((site + touch) % 5) as f64;
-        let known = Knowledge {
+        let known = SignalKnowledge {
             noise: 0.05,
             variance: Some(variance),
             shared: None,
             density: None,
             among: None,
-            forces: with_forces.then_some(Forces {
+            forces: with_forces.then_some(SceneForces {
                 touches: &forces,
                 coming: [3.0, 25.0],
                 possible: 40.0,
@@ -376,7 +376,7 @@ mod tests {
             presses: 24,
         };
         let x = SignalMatrix::new(targets.len(), values);
-        Scene::new(&x, &targets, &known, detail, &unwatched).unwrap()
+        TouchScene::new(&x, &targets, &known, detail, &unwatched).unwrap()
     }
 
     #[test]

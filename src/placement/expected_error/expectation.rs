@@ -3,14 +3,14 @@
 
 use rayon::prelude::*;
 
-use super::bank::{Bank, Rows};
+use super::bank::{Bank, TrialMemory};
 use super::losses::Losses;
-use super::scene::{Detail, Knowledge, Scene};
+use super::scene::{Detail, SignalKnowledge, TouchScene};
 use crate::budget::{Cancelled, Watch, report};
 use crate::placement::constraints::{Constraints, LostBy, PartialSet, reached};
 use crate::placement::exchange::{Criterion, gains};
 use crate::placement::margin::Best;
-use crate::placement::{PlacementError, Pool, Request, SensorSet};
+use crate::placement::{PlacementError, Pool, SelectionRequest, SensorSet};
 
 const SELECTING: &str = "Selecting by expected error";
 /// Sites that are looked at in fine detail.
@@ -29,26 +29,26 @@ pub(super) struct Expectation<'a> {
     /// others have hardly changed since then.
     promising: Vec<Option<Vec<usize>>>,
     pool: &'a Pool<'a>,
-    request: &'a Request<'a>,
+    request: &'a SelectionRequest<'a>,
     losses: Option<Losses>,
 }
 
 /// The same touches in coarse and in fine detail.
 pub(super) struct Scenes {
-    coarse: Scene,
-    fine: Scene,
+    coarse: TouchScene,
+    fine: TouchScene,
 }
 
 impl Scenes {
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn new(
-        known: &Knowledge,
+        known: &SignalKnowledge,
         detail: Detail,
         pool: &Pool,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        let scene = |detail: Detail| Scene::new(pool.x, pool.targets, known, detail, watch);
+        let scene = |detail: Detail| TouchScene::new(pool.x, pool.targets, known, detail, watch);
         Ok(Self {
             coarse: scene(detail.coarse())?,
             fine: scene(detail)?,
@@ -57,21 +57,21 @@ impl Scenes {
 }
 
 /// What is expected of a set.
-pub(super) struct Expected {
+pub(super) struct ExpectedSet {
     /// With all gauges (mm).
     pub whole: f64,
     /// After each loss (mm).
     pub lost: Vec<f64>,
 }
 
-impl Expected {
+impl ExpectedSet {
     /// Of a set of a scene, and where gauges may be lost, of what is left of it in another of the same touches.
     ///
     /// # Errors
     /// [`Cancelled`] when `report` does so.
     pub fn of(
-        scene: &Scene,
-        losses: Option<(&Losses, &Scene)>,
+        scene: &TouchScene,
+        losses: Option<(&Losses, &TouchScene)>,
         set: &[usize],
         report: &(dyn Fn() -> Result<(), Cancelled> + Sync),
     ) -> Result<Self, Cancelled> {
@@ -101,7 +101,7 @@ impl<'a> Expectation<'a> {
     pub fn new(
         scenes: &'a Scenes,
         pool: &'a Pool<'a>,
-        request: &'a Request<'a>,
+        request: &'a SelectionRequest<'a>,
         seed: u64,
     ) -> Self {
         Self {
@@ -115,7 +115,7 @@ impl<'a> Expectation<'a> {
     }
 
     /// The touches in the detail that counts.
-    pub fn scene(&self) -> &Scene {
+    pub fn scene(&self) -> &TouchScene {
         &self.scenes.fine
     }
 
@@ -124,14 +124,14 @@ impl<'a> Expectation<'a> {
         Ok(self.expected(set)?.weighed(self.request.constraints))
     }
 
-    fn expected(&self, set: &[usize]) -> Result<Expected, Cancelled> {
+    fn expected(&self, set: &[usize]) -> Result<ExpectedSet, Cancelled> {
         let losses = self.losses.as_ref().map(|l| (l, self.scene_of(l)));
         let report = || self.report(set.len());
-        Expected::of(&self.scenes.fine, losses, set, &report)
+        ExpectedSet::of(&self.scenes.fine, losses, set, &report)
     }
 
     /// The touches in the detail in which losses are looked at.
-    fn scene_of(&self, losses: &Losses) -> &Scene {
+    fn scene_of(&self, losses: &Losses) -> &TouchScene {
         if losses.many {
             &self.scenes.coarse
         } else {
@@ -394,7 +394,7 @@ fn seats(others: &[usize], number: usize) -> impl Iterator<Item = (usize, usize)
 
 /// What is left when the gauges of some turns are lost.
 fn left<'a>(
-    scene: &'a Scene,
+    scene: &'a TouchScene,
     seats: impl Iterator<Item = (usize, usize)>,
     lost: &[usize],
 ) -> Bank<'a> {
@@ -458,7 +458,7 @@ pub(super) fn scan(
     const PIECE: usize = 64;
     let piece = |places: &[usize]| -> Result<Vec<f64>, Cancelled> {
         report(watch, SELECTING, step.0, step.1)?;
-        let mut rows: Rows = bank.rows();
+        let mut rows: TrialMemory = bank.rows();
         Ok(bank.with(places, &mut rows))
     };
     let pieces: Result<Vec<Vec<f64>>, Cancelled> = open.par_chunks(PIECE).map(piece).collect();

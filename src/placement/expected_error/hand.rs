@@ -7,21 +7,21 @@ use glam::DVec3;
 
 use super::bank::Bank;
 use super::scan;
-use super::scene::Scene;
+use super::scene::TouchScene;
 use crate::budget::{Cancelled, Watch, report};
 
 pub use crate::uncertainty::BLIND;
 
 /// A set of which one gauge is in hand. The others are taken in once; each place of the one that moves then costs no
 /// more than one gauge.
-pub struct Hand<'a> {
+pub struct GaugeInHand<'a> {
     others: Bank<'a>,
 }
 
-impl<'a> Hand<'a> {
+impl<'a> GaugeInHand<'a> {
     /// Around the gauges of a set (rows of the scene), without the one that moves.
     #[must_use]
-    pub fn around(scene: &'a Scene, set: &[usize], moves: usize) -> Self {
+    pub fn around(scene: &'a TouchScene, set: &[usize], moves: usize) -> Self {
         let mut others = Bank::new(scene);
         for (turn, &site) in set.iter().enumerate().filter(|(turn, _)| *turn != moves) {
             others.take_turn(turn);
@@ -43,7 +43,7 @@ impl<'a> Hand<'a> {
     }
 }
 
-impl Scene {
+impl TouchScene {
     /// Where its presses are (mm).
     #[must_use]
     pub fn presses_mm(&self) -> Vec<DVec3> {
@@ -72,7 +72,7 @@ impl Scene {
 
 /// Which presses move no gauge of a set far enough to be told from noise, were they as hard as a force (N).
 #[must_use]
-pub fn blind(scene: &Scene, set: &[usize], force: f64) -> Vec<bool> {
+pub fn blind(scene: &TouchScene, set: &[usize], force: f64) -> Vec<bool> {
     let mut blind = vec![true; scene.presses.len()];
     for &site in set {
         let readings = scene.at_presses.of(site).value;
@@ -88,7 +88,7 @@ pub fn blind(scene: &Scene, set: &[usize], force: f64) -> Vec<bool> {
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
 pub fn most_helpful(
-    scene: &Scene,
+    scene: &TouchScene,
     set: &[usize],
     open: &[usize],
     watch: Watch,
@@ -114,14 +114,14 @@ pub fn most_helpful(
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
 pub fn least_helpful(
-    scene: &Scene,
+    scene: &TouchScene,
     set: &[usize],
     watch: Watch,
 ) -> Result<Option<(usize, f64)>, Cancelled> {
     let mut least: Option<(usize, f64)> = None;
     for k in 0..set.len() {
         report(watch, "Leaving gauges out", k, set.len())?;
-        let error = Hand::around(scene, set, k).error_without();
+        let error = GaugeInHand::around(scene, set, k).error_without();
         if least.is_none_or(|(_, least)| error < least) {
             least = Some((k, error));
         }
@@ -134,11 +134,11 @@ pub(super) mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::dataset::SignalMatrix;
-    use crate::placement::expected_error::{Detail, Forces, Knowledge, expected};
+    use crate::placement::expected_error::{Detail, SceneForces, SignalKnowledge, expected};
 
     /// Touches on a square of 60 mm; the signals of six sites fall with the distance from each (mm), but for the last,
     /// which hears next to nothing.
-    pub fn plate() -> Scene {
+    pub fn plate() -> TouchScene {
         const SITES: [[f64; 2]; 6] = [
             [5.0, 5.0],
             [55.0, 8.0],
@@ -160,13 +160,13 @@ pub(super) mod tests {
             .flat_map(|s| targets.iter().map(move |at| signal(s, at)))
             .collect();
         let forces = vec![1.0; targets.len()];
-        let known = Knowledge {
+        let known = SignalKnowledge {
             noise: 1.0,
             variance: None,
             shared: None,
             density: None,
             among: None,
-            forces: Some(Forces {
+            forces: Some(SceneForces {
                 touches: &forces,
                 coming: [3.0, 12.0],
                 possible: 20.0,
@@ -178,10 +178,10 @@ pub(super) mod tests {
             places: 150,
             presses: 60,
         };
-        Scene::new(&x, &targets, &known, detail, &unwatched).unwrap()
+        TouchScene::new(&x, &targets, &known, detail, &unwatched).unwrap()
     }
 
-    fn everything(scene: &Scene, errors: &[f64]) -> f64 {
+    fn everything(scene: &TouchScene, errors: &[f64]) -> f64 {
         scene.mean_among(errors, |_| true).unwrap()
     }
 
@@ -191,7 +191,7 @@ pub(super) mod tests {
         let set = [0, 1, 2, 3];
         let (error, errors) = expected(&scene, &set);
         // What a choice expects of the same gauge more.
-        let last = Hand::around(&scene, &set, 3).errors_with(3);
+        let last = GaugeInHand::around(&scene, &set, 3).errors_with(3);
         let others = Bank::of(&scene, &set[..3]);
         let chosen = others.with(&[3], &mut others.rows())[0];
         assert!((everything(&scene, &last) / chosen - 1.0).abs() < 1e-6);
@@ -201,7 +201,7 @@ pub(super) mod tests {
         }
         // Whichever is in hand hears what it hears in the set.
         for moves in 0..set.len() {
-            let held = Hand::around(&scene, &set, moves).errors_with(set[moves]);
+            let held = GaugeInHand::around(&scene, &set, moves).errors_with(set[moves]);
             let mean = everything(&scene, &held);
             assert!(
                 (mean / error - 1.0).abs() < 2e-2,
@@ -209,7 +209,7 @@ pub(super) mod tests {
             );
         }
         // Elsewhere it is worth something else.
-        let moved = everything(&scene, &Hand::around(&scene, &set, 3).errors_with(5));
+        let moved = everything(&scene, &GaugeInHand::around(&scene, &set, 3).errors_with(5));
         assert!(moved > 1.02 * error, "{moved} {error}");
     }
 

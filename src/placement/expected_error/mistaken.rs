@@ -5,7 +5,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bank::Bank;
-use super::scene::{OWN, Scene};
+use super::scene::{OWN, TouchScene};
 use crate::budget::{Cancelled, Watch, report};
 
 /// Where a press could be taken to be, beside where it is.
@@ -21,14 +21,14 @@ pub struct Mistaken {
 
 /// Two places of which the first is taken for the second.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pair {
+pub struct MistakenPair {
     /// Where the touch is (mm).
     pub from_mm: DVec3,
     /// Where it is taken to be.
     pub taken: Mistaken,
 }
 
-impl Pair {
+impl MistakenPair {
     /// What the confusion adds to the expected error of a press there (mm).
     #[must_use]
     pub fn cost_mm(&self) -> f64 {
@@ -46,7 +46,7 @@ impl Pair {
 
 /// The probability of each place of a scene for one of its presses, were it as hard as a force (N): they sum to one.
 #[must_use]
-pub fn posterior(scene: &Scene, set: &[usize], press: usize, force: f64) -> Vec<f64> {
+pub fn posterior(scene: &TouchScene, set: &[usize], press: usize, force: f64) -> Vec<f64> {
     let costs = Bank::costs(scene, set, press, force);
     let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
     let weights: Vec<f64> = costs.iter().map(|c| (least - c).exp()).collect();
@@ -56,7 +56,7 @@ pub fn posterior(scene: &Scene, set: &[usize], press: usize, force: f64) -> Vec<
 
 /// What a press of some force (N) could be taken for, the likeliest first: places that stand together are one.
 #[must_use]
-pub fn taken_for(scene: &Scene, set: &[usize], press: usize, force: f64) -> Vec<Mistaken> {
+pub fn taken_for(scene: &TouchScene, set: &[usize], press: usize, force: f64) -> Vec<Mistaken> {
     /// Below this nobody needs to know.
     const LEAST: f64 = 0.01;
     const MOST: usize = 6;
@@ -94,33 +94,33 @@ pub fn taken_for(scene: &Scene, set: &[usize], press: usize, force: f64) -> Vec<
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
 pub fn worst_pairs(
-    scene: &Scene,
+    scene: &TouchScene,
     set: &[usize],
     force: f64,
     watch: Watch,
-) -> Result<Vec<Pair>, Cancelled> {
+) -> Result<Vec<MistakenPair>, Cancelled> {
     const MOST: usize = 8;
     /// Ends of pairs that are nearer than so many reaches say the same.
     const NEAR: f64 = 4.0;
-    let worst = |press: usize| -> Result<Option<Pair>, Cancelled> {
+    let worst = |press: usize| -> Result<Option<MistakenPair>, Cancelled> {
         report(watch, "Looking for confusions", 0, 1)?;
         let pairs = taken_for(scene, set, press, force).into_iter();
-        let pairs = pairs.map(|taken| Pair {
+        let pairs = pairs.map(|taken| MistakenPair {
             from_mm: scene.presses[press].position,
             taken,
         });
         Ok(pairs.max_by(|a, b| a.cost_mm().total_cmp(&b.cost_mm())))
     };
-    let found: Result<Vec<Option<Pair>>, Cancelled> = (0..scene.presses.len())
+    let found: Result<Vec<Option<MistakenPair>>, Cancelled> = (0..scene.presses.len())
         .into_par_iter()
         .map(worst)
         .collect();
-    let mut all: Vec<Pair> = found?.into_iter().flatten().collect();
+    let mut all: Vec<MistakenPair> = found?.into_iter().flatten().collect();
     // Stable: those of equal cost stay in the order of the presses.
     all.sort_by(|a, b| b.cost_mm().total_cmp(&a.cost_mm()));
     let reach: f64 = scene.places.iter().map(|p| p.reach).sum();
     let near = NEAR * reach / scene.places.len().max(1) as f64;
-    let mut worst: Vec<Pair> = Vec::new();
+    let mut worst: Vec<MistakenPair> = Vec::new();
     for pair in all {
         if worst.len() == MOST {
             break;
@@ -169,10 +169,10 @@ mod tests {
             let apart = pair.from_mm.distance(pair.taken.place_mm);
             assert!((apart - pair.taken.apart_mm).abs() < 1e-9);
         }
-        let costs: Vec<f64> = pairs.iter().map(Pair::cost_mm).collect();
+        let costs: Vec<f64> = pairs.iter().map(MistakenPair::cost_mm).collect();
         assert!(costs.is_sorted_by(|a, b| a >= b), "{costs:?}");
         let few = worst_pairs(&scene, &[0, 1, 2, 3, 4], 8.0, &unwatched).unwrap();
-        let cost = |pairs: &[Pair]| pairs.first().map_or(0.0, Pair::cost_mm);
+        let cost = |pairs: &[MistakenPair]| pairs.first().map_or(0.0, MistakenPair::cost_mm);
         assert!(cost(&few) < cost(&pairs));
     }
 

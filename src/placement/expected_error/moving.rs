@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use super::bank::Bank;
-use super::expectation::Expected;
-use super::hand::Hand;
+use super::expectation::ExpectedSet;
+use super::hand::GaugeInHand;
 use super::losses::Losses;
-use super::scene::{Beside, NUISANCES, Outlook, Scene, Shared, Variance};
-use super::{Detail, Knowledge};
+use super::scene::{Beside, NUISANCES, SceneOutlook, SharedUnknowns, TouchScene, Variance};
+use super::{Detail, SignalKnowledge};
 use crate::budget::{Cancelled, Watch};
 use crate::dataset::SignalMatrix;
 use crate::placement::Constraints;
@@ -23,8 +23,8 @@ pub struct Moving<'a> {
 
 /// The seats, in some detail.
 struct Seated<'a> {
-    outlook: Outlook<'a>,
-    scene: Scene,
+    outlook: SceneOutlook<'a>,
+    scene: TouchScene,
 }
 
 impl<'a> Moving<'a> {
@@ -36,14 +36,14 @@ impl<'a> Moving<'a> {
     pub fn new(
         x: &SignalMatrix,
         targets: &[[f64; 3]],
-        known: &Knowledge<'a>,
+        known: &SignalKnowledge<'a>,
         (detail, seats): (Detail, usize),
         constraints: &'a Constraints,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
         let nobody = SignalMatrix::new(x.columns(), vec![0.0; seats * x.columns()]);
         let seated = |detail: Detail| -> Result<Seated<'a>, Cancelled> {
-            let outlook = Outlook::new(x, targets, known, detail, watch)?;
+            let outlook = SceneOutlook::new(x, targets, known, detail, watch)?;
             let scene = outlook.scene(&nobody, Beside::default(), watch)?;
             Ok(Seated { outlook, scene })
         };
@@ -59,7 +59,7 @@ impl<'a> Moving<'a> {
     }
 
     /// Puts a gauge into a seat: what it reads under every touch, the variance that is on it, and what it feels with all
-    /// others ([`Shared::felt`]), by the touch.
+    /// others ([`SharedUnknowns::felt`]), by the touch.
     pub fn seat(
         &mut self,
         seat: usize,
@@ -70,7 +70,7 @@ impl<'a> Moving<'a> {
         let row = SignalMatrix::new(x.len(), x.to_vec());
         let variance: Variance = &|_, touch| variance(touch);
         // What there is to find is the outlook's.
-        let shared = Shared {
+        let shared = SharedUnknowns {
             felt: &|_, touch| felt(touch),
             nuisances: [None; NUISANCES],
             drift: 0.0,
@@ -95,7 +95,7 @@ impl<'a> Moving<'a> {
     ) -> Result<f64, Cancelled> {
         let lossy = self.coarse.as_ref().unwrap_or(&self.fine);
         let losses = self.losses.as_ref().map(|l| (l, &lossy.scene));
-        let expected = Expected::of(&self.fine.scene, losses, set, report)?;
+        let expected = ExpectedSet::of(&self.fine.scene, losses, set, report)?;
         Ok(expected.weighed(self.constraints))
     }
 
@@ -110,7 +110,7 @@ impl<'a> Moving<'a> {
     #[must_use]
     pub fn with_each(&self, set: &[usize], number: usize, others: &[usize]) -> Vec<f64> {
         let scene = &self.fine.scene;
-        let hand = Hand::around(scene, set, number);
+        let hand = GaugeInHand::around(scene, set, number);
         let error = |&seat: &usize| {
             let errors = hand.errors_with(seat);
             scene.mean_among(&errors, |_| true).unwrap_or(f64::INFINITY)

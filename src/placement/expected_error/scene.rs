@@ -11,18 +11,18 @@ mod shared;
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use self::scatter::Scatter;
-pub use self::shared::{NUISANCES, Shared};
+pub use self::scatter::ReadingScatter;
+pub use self::shared::{NUISANCES, SharedUnknowns};
 
-use self::around::{Around, Neighbour};
+use self::around::{Around, PlaceNeighbour};
 use self::merged::Merged;
-pub(super) use self::places::{Level, Neighbourhood, OWN, Place};
+pub(super) use self::places::{ForceLevel, Neighbourhood, OWN, ScenePlace};
 use self::places::{
     REACH, draws, farthest_first, in_neighbourhoods, in_turns, levels, spacing, standing,
 };
 use self::reports::ROWS;
 pub(super) use self::reports::{LANES, Report, Reports};
-use self::shared::Unknown;
+use self::shared::TouchUnknown;
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::regression::folds::evenly;
@@ -60,12 +60,12 @@ impl Default for Detail {
 }
 
 /// Variance of each reading (sites × touches) that is not noise, in the square of the signal's unit, at the force of
-/// the touch: what gluing and model put on it, or what data scatter by ([`Scatter`]).
+/// the touch: what gluing and model put on it, or what data scatter by ([`ReadingScatter`]).
 pub type Variance<'a> = &'a (dyn Fn(usize, usize) -> f64 + Sync);
 
 /// How hard touches are.
 #[derive(Clone, Copy)]
-pub struct Forces<'a> {
+pub struct SceneForces<'a> {
     /// Of each touch of the data (N); the signals grow with it.
     pub touches: &'a [f64],
     /// The lightest and the hardest that will come (N).
@@ -75,39 +75,39 @@ pub struct Forces<'a> {
 }
 
 /// What is known of the signals beside their values.
-pub struct Knowledge<'a> {
+pub struct SignalKnowledge<'a> {
     /// Standard deviation of the noise, in the unit of the signals.
     pub noise: f64,
     /// Absent where nothing but noise is known to be off, which is true of no measurement: for data alone it is
-    /// [`Scatter`]'s. A simulation is exact, and knows what gluing and elements do to it; guessing at its scatter
+    /// [`ReadingScatter`]'s. A simulation is exact, and knows what gluing and elements do to it; guessing at its scatter
     /// from its neighbours would count how it bends twice.
     pub variance: Option<Variance<'a>>,
     /// What all sites feel together of a touch, beside its place and force; nothing where absent.
-    pub shared: Option<&'a Shared<'a>>,
+    pub shared: Option<&'a SharedUnknowns<'a>>,
     /// How many times as many of the touches come to a piece of the surface as to others, of each touch; as many
     /// everywhere where absent. Whoever finds touches takes any piece to be as likely as another.
     pub density: Option<&'a [f64]>,
     /// Touches that places are taken from, rising: those whose variance is known. All where absent.
     pub among: Option<&'a [usize]>,
     /// Absent where the signals are what they are.
-    pub forces: Option<Forces<'a>>,
+    pub forces: Option<SceneForces<'a>>,
     /// Of places, presses and noise.
     pub seed: u64,
 }
 
 /// Everything that a choice needs to know of the touches; the readings of all sites are in it.
-pub struct Scene {
-    pub(super) places: Vec<Place>,
+pub struct TouchScene {
+    pub(super) places: Vec<ScenePlace>,
     pub(super) at_places: Reports,
-    pub(super) presses: Vec<Place>,
+    pub(super) presses: Vec<ScenePlace>,
     /// Of each press.
     pub(super) around: Vec<Neighbourhood>,
     pub(super) at_presses: Reports,
-    pub(super) levels: Vec<Level>,
+    pub(super) levels: Vec<ForceLevel>,
     /// The hardest force that is thought possible (N); nothing to find where it is absent.
     pub(super) hardest: Option<f64>,
     /// What else there is to find of a touch, of unit deviation.
-    pub(super) unknowns: Vec<Unknown>,
+    pub(super) unknowns: Vec<TouchUnknown>,
     draws: Vec<f32>,
     /// What it is: unknowns × presses.
     made: Vec<f32>,
@@ -119,17 +119,17 @@ const TURNS: usize = 64;
 /// Noise is taken to be no less than this share of the signals' rms: no model is better than that.
 const LEAST_NOISE: f64 = 1e-3;
 
-impl Scene {
+impl TouchScene {
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn new(
         x: &SignalMatrix,
         targets: &[[f64; 3]],
-        known: &Knowledge,
+        known: &SignalKnowledge,
         detail: Detail,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        Outlook::new(x, targets, known, detail, watch)?.scene(x, known.beside(), watch)
+        SceneOutlook::new(x, targets, known, detail, watch)?.scene(x, known.beside(), watch)
     }
 
     /// Noise of unit deviation in what the gauge of a turn reads of each press.
@@ -151,25 +151,25 @@ impl Scene {
 }
 
 /// Where a scene looks, whatever is glued: what gauges report there may be taken again for one of them alone.
-pub(super) struct Outlook<'a> {
+pub(super) struct SceneOutlook<'a> {
     merged: Merged,
     places: Spots,
     presses: Spots,
     /// One over the unit of readings.
     unit: f64,
-    forces: Option<Forces<'a>>,
-    unknowns: Vec<Unknown>,
+    forces: Option<SceneForces<'a>>,
+    unknowns: Vec<TouchUnknown>,
     seed: u64,
 }
 
 /// Some of the places of data.
 struct Spots {
     numbers: Vec<usize>,
-    neighbours: Vec<Vec<Neighbour>>,
-    standing: Vec<Place>,
+    neighbours: Vec<Vec<PlaceNeighbour>>,
+    standing: Vec<ScenePlace>,
 }
 
-impl<'a> Outlook<'a> {
+impl<'a> SceneOutlook<'a> {
     /// Of touches under which sites read `x`; readings are measured in their noise.
     ///
     /// # Errors
@@ -177,7 +177,7 @@ impl<'a> Outlook<'a> {
     pub fn new(
         x: &SignalMatrix,
         targets: &[[f64; 3]],
-        known: &Knowledge<'a>,
+        known: &SignalKnowledge<'a>,
         detail: Detail,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
@@ -224,14 +224,14 @@ impl<'a> Outlook<'a> {
         x: &SignalMatrix,
         beside: Beside,
         watch: Watch,
-    ) -> Result<Scene, Cancelled> {
+    ) -> Result<TouchScene, Cancelled> {
         let reader = self.reader(x, beside);
         let at_places = reader.reports(&self.places);
         report(watch, "Looking at touches", 1, 2)?;
         let at_presses = reader.reports(&self.presses);
         let presses = self.presses.numbers.len();
         let (standing, places) = (&self.presses.standing, &self.places.standing);
-        Ok(Scene {
+        Ok(TouchScene {
             around: (standing.iter())
                 .map(|p| Neighbourhood::of(p, places))
                 .collect(),
@@ -250,7 +250,7 @@ impl<'a> Outlook<'a> {
 
     /// Puts another gauge in the stead of a site of a scene: what it reads under every touch, as one row, and what is
     /// off with it.
-    pub fn retake(&self, scene: &mut Scene, site: usize, x: &SignalMatrix, beside: Beside) {
+    pub fn retake(&self, scene: &mut TouchScene, site: usize, x: &SignalMatrix, beside: Beside) {
         let reader = self.reader(x, beside);
         let of = [
             (&mut scene.at_places, &self.places),
@@ -261,8 +261,8 @@ impl<'a> Outlook<'a> {
         }
     }
 
-    fn reader<'b>(&'b self, x: &'b SignalMatrix, beside: Beside<'b>) -> Reader<'b> {
-        Reader {
+    fn reader<'b>(&'b self, x: &'b SignalMatrix, beside: Beside<'b>) -> SignalReader<'b> {
+        SignalReader {
             x,
             merged: &self.merged,
             beside,
@@ -279,10 +279,10 @@ impl<'a> Outlook<'a> {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Beside<'a> {
     pub variance: Option<Variance<'a>>,
-    pub shared: Option<&'a Shared<'a>>,
+    pub shared: Option<&'a SharedUnknowns<'a>>,
 }
 
-impl<'a> Knowledge<'a> {
+impl<'a> SignalKnowledge<'a> {
     fn beside(&self) -> Beside<'a> {
         Beside {
             variance: self.variance,
@@ -298,18 +298,18 @@ fn unit(x: &SignalMatrix, noise: f64) -> f64 {
     noise.max(LEAST_NOISE * rms).max(f64::MIN_POSITIVE)
 }
 
-struct Reader<'a> {
+struct SignalReader<'a> {
     x: &'a SignalMatrix,
     merged: &'a Merged,
     beside: Beside<'a>,
     /// Which nuisances of a touch are of use.
     nuisances: Vec<usize>,
-    forces: Option<Forces<'a>>,
+    forces: Option<SceneForces<'a>>,
     /// One over the unit of readings.
     unit: f64,
 }
 
-impl Reader<'_> {
+impl SignalReader<'_> {
     fn reports(&self, at: &Spots) -> Reports {
         Reports {
             count: at.numbers.len().next_multiple_of(LANES),
@@ -344,7 +344,13 @@ impl Reader<'_> {
     }
 
     /// Value, slopes and variance of a site of these values.
-    fn report(&self, values: &[f64], site: usize, place: usize, around: &[Neighbour]) -> [f64; 4] {
+    fn report(
+        &self,
+        values: &[f64],
+        site: usize,
+        place: usize,
+        around: &[PlaceNeighbour],
+    ) -> [f64; 4] {
         let value = values[place];
         let mut slopes = [0.0; 2];
         for neighbour in around {
@@ -415,12 +421,12 @@ pub struct SiteSignal {
 pub fn templates(
     x: &SignalMatrix,
     targets: &[[f64; 3]],
-    known: &Knowledge,
+    known: &SignalKnowledge,
 ) -> (Vec<Template>, f64) {
     let merged = Merged::new(targets, known.forces.map(|f| f.touches));
     let around = Around::new(&merged.positions, &merged.groups);
     let unit = unit(x, known.noise);
-    let reader = Reader {
+    let reader = SignalReader {
         x,
         merged: &merged,
         beside: known.beside(),

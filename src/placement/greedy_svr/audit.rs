@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::race::Scored;
 use super::screen::LEVELS;
-use super::search::Search;
+use super::search::GreedySearch;
 use super::settings::GreedySvr;
 use crate::budget::Watch;
-use crate::placement::{Constraints, PlacementError, Pool, Request};
+use crate::placement::{Constraints, PlacementError, Pool, SelectionRequest};
 
 /// How many others are compared at each step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,20 +64,20 @@ impl GreedySvr {
         watch: Watch,
     ) -> Result<Vec<Comparison>, PlacementError> {
         let constraints = Constraints::count(chosen.len());
-        let request = Request {
+        let request = SelectionRequest {
             constraints: &constraints,
             watch,
             found: &|_| (),
         };
         let folds = self.split(pool.targets)?;
-        let mut search = Search::new(self, pool, &request, &folds);
+        let mut search = GreedySearch::new(self, pool, &request, &folds);
         (0..chosen.len())
             .map(|step| search.compare(chosen, step, audit))
             .collect()
     }
 }
 
-impl Search<'_> {
+impl GreedySearch<'_> {
     fn compare(
         &mut self,
         chosen: &[usize],

@@ -9,14 +9,14 @@ use rayon::prelude::*;
 use crate::budget::{Cancelled, Progress, Watch};
 use crate::regression::Hyper;
 use crate::regression::folds::Folds;
-use crate::regression::svr::{self, Fit, Problem, Start};
+use crate::regression::svr::{self, Problem, Start, SvrFit};
 use crate::regression::tune::{Effort, mean_distance};
 
 /// Largest tolerance, as a share of the targets' spread.
 const RELATIVE: f64 = 2e-3;
 
 /// What all exact fits of one search share; touches in the order of the folds.
-pub struct Judge<'a> {
+pub struct ExactFits<'a> {
     /// Coordinates of the touches (mm), an axis each.
     pub targets: [Vec<f64>; 3],
     /// What the criterion is cross-validated over.
@@ -28,15 +28,15 @@ pub struct Judge<'a> {
 }
 
 /// Fits of one set: 3 × folds of them, fold by fold.
-pub struct Judged {
+pub struct JudgedFits {
     /// The criterion (mm).
     pub error: f64,
-    fits: Vec<Fit>,
+    fits: Vec<SvrFit>,
     /// Whether all fits reached their tolerance.
     pub converged: bool,
 }
 
-impl Judged {
+impl JudgedFits {
     /// Residuals and dual coefficients, touches × (3 × folds).
     #[must_use]
     pub fn matrices(&self) -> (Mat<f64>, Mat<f64>) {
@@ -48,7 +48,7 @@ impl Judged {
     }
 }
 
-impl<'a> Judge<'a> {
+impl<'a> ExactFits<'a> {
     /// Of targets (mm) in the order of the touches.
     #[must_use]
     pub fn new(hyper: Hyper, effort: Effort, targets: &[[f64; 3]], folds: &'a Folds) -> Self {
@@ -83,7 +83,7 @@ impl<'a> Judge<'a> {
         start: Option<&Mat<f64>>,
         progress: Progress,
         watch: Watch,
-    ) -> Result<Judged, Cancelled> {
+    ) -> Result<JudgedFits, Cancelled> {
         let start = start.map(|beta| self.prepared(kernel, beta));
         let cancelled = AtomicBool::new(false);
         let stop = || {
@@ -95,7 +95,7 @@ impl<'a> Judge<'a> {
         // A tolerance larger than what there is to learn would be met by learning nothing.
         let mut params = self.hyper.params(self.effort);
         params.tolerance = params.tolerance.min(RELATIVE * self.target_deviation());
-        let fits: Vec<Fit> = (0..3 * self.folds.parts.len())
+        let fits: Vec<SvrFit> = (0..3 * self.folds.parts.len())
             .into_par_iter()
             .map(|j| {
                 let problem = Problem {
@@ -119,7 +119,7 @@ impl<'a> Judge<'a> {
         let sum: f64 = by_fold
             .map(|(fits, part)| mean_distance(fits, part.clone()))
             .sum();
-        Ok(Judged {
+        Ok(JudgedFits {
             error: sum / self.folds.parts.len() as f64,
             converged: fits.iter().all(|f| f.converged),
             fits,

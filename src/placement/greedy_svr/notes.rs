@@ -1,12 +1,12 @@
 //! What has to be known of a choice: settings with which nothing can be learned, ties, and how exact it is.
 
-use super::search::Search;
+use super::search::GreedySearch;
 use crate::placement::{SensorSet, margin};
 use crate::regression::Hyper;
 use crate::regression::folds::evenly;
 
 /// What has to be known of sets that a search found.
-pub(super) fn notes(search: &Search, sets: &[SensorSet]) -> Vec<String> {
+pub(super) fn notes(search: &GreedySearch, sets: &[SensorSet]) -> Vec<String> {
     let mut notes = Vec::new();
     notes.extend(degenerate(search).or_else(|| out_of_scale(search)));
     notes.extend(margin::ties(sets, search.settings.tolerance));
@@ -26,7 +26,7 @@ pub(super) fn notes(search: &Search, sets: &[SensorSet]) -> Vec<String> {
 }
 
 /// What makes the regression unable to learn anything.
-fn degenerate(search: &Search) -> Option<String> {
+fn degenerate(search: &GreedySearch) -> Option<String> {
     /// Off the diagonal all kernel values within this of one, or of zero.
     const SAME: f64 = 1e-9;
     /// Rows looked at.
@@ -61,7 +61,7 @@ fn degenerate(search: &Search) -> Option<String> {
 }
 
 /// That C or ε, which are in millimetres, were meant for parts of another size.
-fn out_of_scale(search: &Search) -> Option<String> {
+fn out_of_scale(search: &GreedySearch) -> Option<String> {
     /// The least C and the largest ε over the spread of the targets at which most of it can be learned: a
     /// tenth and ten times of what suits the bundled limb.
     const LEAST_C: f64 = 0.5;

@@ -46,7 +46,7 @@ impl Relation {
 
 /// How a race between two scores is run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rules {
+pub struct RaceRules {
     /// The fewest candidates that are scored: a relation known from one candidate is none.
     pub least: usize,
     /// Candidates scored at once after those.
@@ -81,7 +81,7 @@ pub struct Raced {
 /// [`Cancelled`] from the scores.
 pub fn race(
     cheap: &[Scored],
-    rules: &Rules,
+    rules: &RaceRules,
     worth: &dyn Fn(Scored) -> f64,
     mut score: impl FnMut(&[usize]) -> Result<Vec<f64>, Cancelled>,
 ) -> Result<Raced, Cancelled> {
@@ -161,7 +161,7 @@ mod tests {
                 error: truth(place) * departs(place),
             })
             .collect();
-        let rules = Rules {
+        let rules = RaceRules {
             least: 12,
             batch: 12,
             audits: 4,

@@ -8,16 +8,16 @@ use std::ops::Range;
 use faer::Mat;
 
 use crate::dataset::SignalMatrix;
-use crate::regression::admm::{self, Setting, State};
+use crate::regression::admm::{self, AdmmSetting, AdmmState};
 use crate::regression::folds::{Folds, evenly};
 use crate::regression::{Hyper, kernel, lowrank};
 
 /// Asked now and then whether to give up.
-pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
+pub type GiveUp<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// What one screen spends on a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Level {
+pub struct ScreenEffort {
     /// Most touches that it fits.
     pub touches: usize,
     /// Landmarks of the low-rank kernel, to begin with.
@@ -30,7 +30,7 @@ pub struct Level {
     pub most_landmarks: usize,
 }
 
-impl Level {
+impl ScreenEffort {
     /// With more or fewer landmarks.
     #[must_use]
     pub fn scaled(self, by: f64) -> Self {
@@ -44,29 +44,29 @@ impl Level {
 }
 
 /// From the one that looks at every candidate to the one that is nearly exact.
-pub const LEVELS: [Level; 4] = [
-    Level {
+pub const LEVELS: [ScreenEffort; 4] = [
+    ScreenEffort {
         touches: 1000,
         landmarks: 64,
         iterations: 10,
         aim: 0.05,
         most_landmarks: 160,
     },
-    Level {
+    ScreenEffort {
         touches: usize::MAX,
         landmarks: 128,
         iterations: 12,
         aim: 0.02,
         most_landmarks: 300,
     },
-    Level {
+    ScreenEffort {
         touches: usize::MAX,
         landmarks: 220,
         iterations: 20,
         aim: 0.01,
         most_landmarks: 500,
     },
-    Level {
+    ScreenEffort {
         touches: usize::MAX,
         landmarks: 400,
         iterations: 40,
@@ -78,7 +78,7 @@ pub const LEVELS: [Level; 4] = [
 /// The touches, landmarks and targets of one level.
 pub struct Sieve {
     /// What it spends.
-    pub level: Level,
+    pub level: ScreenEffort,
     /// Standardized signals, sites × this level's touches.
     features: SignalMatrix,
     /// Places of the touches among all, and of the landmarks among the touches.
@@ -93,7 +93,7 @@ pub struct Sieve {
 impl Sieve {
     /// Of signals (sites × touches) and targets in the order of the folds.
     #[must_use]
-    pub fn new(level: Level, z: &SignalMatrix, targets: &[[f64; 3]], folds: &Folds) -> Self {
+    pub fn new(level: ScreenEffort, z: &SignalMatrix, targets: &[[f64; 3]], folds: &Folds) -> Self {
         let (places, parts) = folds.thinned(level.touches);
         let n = places.len();
         Self {
@@ -150,8 +150,8 @@ impl Sieve {
         out
     }
 
-    fn setting(&self, hyper: &Hyper, rho: f64) -> Setting {
-        Setting {
+    fn setting(&self, hyper: &Hyper, rho: f64) -> AdmmSetting {
+        AdmmSetting {
             y: self.targets.clone(),
             folds: self.parts.clone(),
             c: hyper.c * self.weight,
@@ -162,7 +162,7 @@ impl Sieve {
 }
 
 /// A set of sites with all that the screens need to know of it.
-pub struct Base {
+pub struct ScreenBase {
     /// Kernel between touches and landmarks over the set, a level.
     crosses: Vec<Mat<f64>>,
     /// Residuals of its fits, touches × (3 × folds), in the order of the folds (mm).
@@ -173,7 +173,7 @@ pub struct Base {
     pub error: f64,
 }
 
-impl Base {
+impl ScreenBase {
     /// The empty set, which predicts the middle of the targets.
     #[must_use]
     pub fn empty(sieves: &[Sieve]) -> Self {
@@ -235,7 +235,7 @@ impl Base {
         level: usize,
         site: usize,
         hyper: &Hyper,
-        stop: Stop,
+        stop: GiveUp,
     ) -> f64 {
         self.solved(sieves, level, site, hyper, stop).0
     }
@@ -243,7 +243,13 @@ impl Base {
     /// Criterion and dual coefficients (touches × (3 × folds)) on the last level, where an exact fit can
     /// start.
     #[must_use]
-    pub fn nearly(&self, sieves: &[Sieve], site: usize, hyper: &Hyper, stop: Stop) -> (f64, State) {
+    pub fn nearly(
+        &self,
+        sieves: &[Sieve],
+        site: usize,
+        hyper: &Hyper,
+        stop: GiveUp,
+    ) -> (f64, AdmmState) {
         self.solved(sieves, sieves.len() - 1, site, hyper, stop)
     }
 
@@ -253,12 +259,12 @@ impl Base {
         level: usize,
         site: usize,
         hyper: &Hyper,
-        stop: Stop,
-    ) -> (f64, State) {
+        stop: GiveUp,
+    ) -> (f64, AdmmState) {
         let sieve = &sieves[level];
         let rho = self.rho(hyper);
         let (n, columns) = (sieve.places.len(), self.beta.ncols());
-        let mut state = State {
+        let mut state = AdmmState {
             z: Mat::from_fn(n, columns, |i, j| self.residuals[(sieve.places[i], j)]),
             u: Mat::from_fn(n, columns, |i, j| -self.beta[(sieve.places[i], j)] / rho),
         };

@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::exact::{Judge, Judged};
-use super::race::{Raced, Relation, Rules, Scored, race};
-use super::screen::{Base, LEVELS, Sieve, Stop};
+use super::exact::{ExactFits, JudgedFits};
+use super::race::{RaceRules, Raced, Relation, Scored, race};
+use super::screen::{GiveUp, LEVELS, ScreenBase, Sieve};
 use super::settings::GreedySvr;
 use crate::budget::{Cancelled, Progress, Work, report};
 use crate::dataset::SignalMatrix;
 use crate::placement::constraints::PartialSet;
-use crate::placement::{PlacementError, Pool, Request};
+use crate::placement::{PlacementError, Pool, SelectionRequest};
 use crate::regression::features::Standardizer;
 use crate::regression::folds::Folds;
 use crate::regression::kernel;
@@ -23,7 +23,7 @@ const BATCHES: [(usize, usize); 3] = [(12, 4), (6, 2), (4, 2)];
 const UNKNOWN: f64 = 0.01;
 
 /// What one step found.
-pub(super) struct Step {
+pub(super) struct GreedyStep {
     pub(super) place: usize,
     pub(super) error: f64,
     /// Share by which a better choice may still exist.
@@ -32,17 +32,17 @@ pub(super) struct Step {
     pub(super) margin: Option<f64>,
 }
 
-pub(super) struct Search<'a> {
+pub(super) struct GreedySearch<'a> {
     pub(super) settings: &'a GreedySvr,
-    pub(super) request: &'a Request<'a>,
+    pub(super) request: &'a SelectionRequest<'a>,
     /// Standardized signals, places × touches in the order of the folds.
     pub(super) features: SignalMatrix,
     pub(super) constant: Vec<usize>,
-    pub(super) judge: Judge<'a>,
+    pub(super) judge: ExactFits<'a>,
     pub(super) sieves: Vec<Sieve>,
     /// The set chosen so far, and when failures are expected the same without each of its sites.
-    pub(super) base: Base,
-    pub(super) without: Vec<Base>,
+    pub(super) base: ScreenBase,
+    pub(super) without: Vec<ScreenBase>,
     /// exp(-γ d²) over the chosen sites, touches × touches.
     pub(super) kernel: Vec<f64>,
     /// How each score related to the next in the last step.
@@ -56,7 +56,7 @@ pub(super) struct Search<'a> {
 }
 
 /// What a step knows of the candidates that it has not taken.
-pub(super) struct Seen {
+pub(super) struct SeenCandidates {
     /// Left behind, by the level of their score.
     pub(super) waiting: Vec<(usize, Scored)>,
     /// Fitted exactly.
@@ -68,14 +68,14 @@ pub(super) struct Seen {
 /// A candidate fitted exactly, with the kernel it was fitted on.
 pub(super) struct Finalist {
     pub(super) place: usize,
-    pub(super) judged: Judged,
+    pub(super) judged: JudgedFits,
 }
 
-impl<'a> Search<'a> {
+impl<'a> GreedySearch<'a> {
     pub(super) fn new(
         settings: &'a GreedySvr,
         pool: &'a Pool<'a>,
-        request: &'a Request<'a>,
+        request: &'a SelectionRequest<'a>,
         folds: &'a Folds,
     ) -> Self {
         let n = pool.targets.len();
@@ -91,8 +91,8 @@ impl<'a> Search<'a> {
             request,
             features,
             constant: standardizer.constant_rows(),
-            judge: Judge::new(settings.hyper, settings.effort, pool.targets, folds),
-            base: Base::empty(&sieves),
+            judge: ExactFits::new(settings.hyper, settings.effort, pool.targets, folds),
+            base: ScreenBase::empty(&sieves),
             without: Vec::new(),
             sieves,
             kernel: vec![1.0; n * n],
@@ -109,7 +109,7 @@ impl<'a> Search<'a> {
     pub(super) fn best_addition(
         &mut self,
         field: &PartialSet,
-    ) -> Result<Option<Step>, PlacementError> {
+    ) -> Result<Option<GreedyStep>, PlacementError> {
         let open = field.open();
         if open.is_empty() {
             return Ok(None);
@@ -144,7 +144,7 @@ impl<'a> Search<'a> {
             .into_iter()
             .flat_map(|(level, rest)| rest.into_iter().map(move |s| (level, s)));
         self.exactly += raced.scored.len();
-        let mut seen = Seen {
+        let mut seen = SeenCandidates {
             waiting: waiting.collect(),
             compared: raced.scored,
             relations,
@@ -155,7 +155,7 @@ impl<'a> Search<'a> {
         } else {
             self.second_look(winner, &mut seen, &worth, step)?
         };
-        let Seen {
+        let SeenCandidates {
             waiting,
             compared,
             relations,
@@ -180,7 +180,7 @@ impl<'a> Search<'a> {
         self.relations = relations;
         self.take(winner);
         self.refine(&[&field.chosen[..], &[place]].concat());
-        Ok(Some(Step {
+        Ok(Some(GreedyStep {
             place,
             error: own,
             gap,
@@ -188,10 +188,10 @@ impl<'a> Search<'a> {
         }))
     }
 
-    pub(super) fn rules(&self, from: usize, batch: usize, audits: usize) -> Rules {
+    pub(super) fn rules(&self, from: usize, batch: usize, audits: usize) -> RaceRules {
         let seen = |k: usize| self.relations.get(k).map_or(UNKNOWN, |r| r.deviation);
         let later: f64 = (from + 1..LEVELS.len()).map(|k| seen(k).powi(2)).sum();
-        Rules {
+        RaceRules {
             least: batch,
             batch,
             audits,
@@ -235,7 +235,7 @@ impl<'a> Search<'a> {
     }
 
     /// The criterion when one gauge of the set may have failed: the chance of it weighs what is left of the set.
-    pub(super) fn expected(&self, level: usize, place: usize, error: f64, stop: Stop) -> f64 {
+    pub(super) fn expected(&self, level: usize, place: usize, error: f64, stop: GiveUp) -> f64 {
         let constraints = self.request.constraints;
         let hyper = &self.settings.hyper;
         let others = self.without.iter();
@@ -285,14 +285,14 @@ impl<'a> Search<'a> {
     pub(super) fn second_look(
         &mut self,
         mut winner: Finalist,
-        seen: &mut Seen,
+        seen: &mut SeenCandidates,
         worth: &dyn Fn(Scored) -> f64,
         step: usize,
     ) -> Result<Finalist, PlacementError> {
         /// Looks, and places scored at once.
         const MOST: usize = 32;
         const BATCH: usize = 8;
-        let Seen {
+        let SeenCandidates {
             waiting,
             compared,
             relations,

@@ -1,15 +1,15 @@
 //! Greedy SVR's criterion of whole sets, for choices that are not made gauge by gauge alone.
 
-use super::exact::Judged;
-use super::screen::Base;
-use super::search::Search;
+use super::exact::JudgedFits;
+use super::screen::ScreenBase;
+use super::search::GreedySearch;
 use crate::budget::Cancelled;
 use crate::placement::constraints::{PartialSet, reached};
 use crate::placement::exchange::Criterion;
 use crate::placement::{PlacementError, SensorSet};
 use crate::regression::kernel;
 
-impl Criterion for Search<'_> {
+impl Criterion for GreedySearch<'_> {
     const UNIT: &'static str = "mm";
 
     /// Fitted from the beginning, so that a set has one criterion however it was come to.
@@ -67,11 +67,11 @@ impl Criterion for Search<'_> {
     }
 }
 
-impl Search<'_> {
+impl GreedySearch<'_> {
     /// The cross-validated error (mm) with all gauges of a set.
     fn error(&mut self, set: &[usize]) -> Result<f64, Cancelled> {
         if set.is_empty() {
-            return Ok(Base::empty(&self.sieves).error);
+            return Ok(ScreenBase::empty(&self.sieves).error);
         }
         let kernel = self.kernel_over(set);
         Ok(self.fitted_to(&kernel, set.len(), false)?.error)
@@ -91,15 +91,20 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn base_of(&mut self, set: &[usize]) -> Result<Base, Cancelled> {
+    fn base_of(&mut self, set: &[usize]) -> Result<ScreenBase, Cancelled> {
         if set.is_empty() {
-            return Ok(Base::empty(&self.sieves));
+            return Ok(ScreenBase::empty(&self.sieves));
         }
         let kernel = self.kernel_over(set);
         let judged = self.fitted_to(&kernel, set.len(), true)?;
         let (residuals, beta) = judged.matrices();
         let fitted = (judged.error, residuals, beta);
-        Ok(Base::of(&self.sieves, set, &self.settings.hyper, fitted))
+        Ok(ScreenBase::of(
+            &self.sieves,
+            set,
+            &self.settings.hyper,
+            fitted,
+        ))
     }
 
     /// Exact fits on a kernel, from the coefficients of the set that was looked at last where they may begin there.
@@ -108,7 +113,7 @@ impl Search<'_> {
         kernel: &[f64],
         step: usize,
         from_last: bool,
-    ) -> Result<Judged, Cancelled> {
+    ) -> Result<JudgedFits, Cancelled> {
         let start = from_last.then_some(&self.base.beta);
         let progress = self.progress(step.min(self.request.constraints.sensors));
         let judged = self

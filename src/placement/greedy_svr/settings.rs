@@ -1,6 +1,6 @@
 //! The settings of greedy SVR, and the criterion that they stand for.
 
-use super::exact::Judge;
+use super::exact::ExactFits;
 use crate::budget::{Progress, Watch};
 use crate::placement::{PlacementError, Pool};
 use crate::regression::features::Standardizer;
@@ -87,7 +87,7 @@ impl GreedySvr {
         let features = Standardizer::of(pool.x)
             .apply(pool.x)
             .select_columns(&folds.order);
-        let judge = Judge::new(self.hyper, self.effort, pool.targets, &folds);
+        let judge = ExactFits::new(self.hyper, self.effort, pool.targets, &folds);
         let n = pool.targets.len();
         // Most sets are the one before with one more site.
         let (mut known, mut whole) = (Vec::new(), vec![1.0; n * n]);

@@ -1,6 +1,6 @@
 use super::*;
 use crate::project::{ChosenSite, CostKeys, GluedKeys, RegionKeys};
-use crate::uncertainty::{Gluing, Making, Pressing};
+use crate::uncertainty::{Gluing, HandPressing, Making};
 
 fn project() -> Project {
     let mut project = Project::around("part.stl", None);
@@ -190,7 +190,7 @@ fn what_is_off_is_what_the_keys_say() {
     let usual = project.uncertainty();
     assert_eq!((usual.drift, usual.making), (0.0, Making::EXACT));
     assert_eq!(usual.resolution, 0.0);
-    assert_eq!(usual.pressing, Pressing::default());
+    assert_eq!(usual.pressing, HandPressing::default());
     project.gauge.noise_microstrain = 2.0;
     project.gauge.drift_microstrain = 3.0;
     project.gauge.tolerance.place_mm = 0.5;

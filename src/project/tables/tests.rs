@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::project::Range;
+use crate::project::ValueRange;
 
 /// A project of one key more than it must have.
 fn with(key: &Key, value: &str) -> String {
@@ -65,7 +65,7 @@ fn leaves(value: &toml::Value, path: &mut Vec<String>, see: &mut dyn FnMut(&str)
 #[test]
 fn words_are_those_that_a_file_may_have() {
     for key in all_keys() {
-        let Range::Words(words) = key.range else {
+        let ValueRange::Words(words) = key.range else {
             continue;
         };
         if is_in_a_list(key) {
@@ -102,7 +102,7 @@ fn words_are_those_that_a_file_may_have() {
 #[test]
 fn what_a_control_offers_can_be_used() {
     for key in all_keys() {
-        if let Range::Numbers(span) = key.range {
+        if let ValueRange::Numbers(span) = key.range {
             let offered = key.numbers();
             assert!(
                 span.contains(*offered.start()) && span.contains(*offered.end()),
@@ -121,7 +121,7 @@ fn what_is_usual_lies_in_its_range() {
 #[test]
 fn a_kept_site_is_named_where_it_stands() {
     let mut project = Project::around("a.stl", None);
-    project.kept.push(Kept {
+    project.kept.push(KeptSelection {
         name: "kept".into(),
         selector: "by-hand".into(),
         quality: crate::budget::Quality::Draft,

@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::factor::Shrinking;
-use super::smo::Block;
+use super::smo::WorkingSet;
 use crate::lanes::wide;
 
 /// More free points than this are left to the pair steps.
@@ -25,10 +25,10 @@ pub fn cost(free: usize, points: usize) -> f64 {
 /// Moves the free coefficients to the minimum of ½ βᵀKβ - yᵀβ + ε ‖β‖₁ with their sum kept, as far as
 /// signs and bounds allow: whatever meets zero or its bound on the way stays there, and the rest goes on
 /// without it. Ends where it is once `stop` says so.
-pub fn minimize(block: &mut Block, free: &[usize], stop: &(dyn Fn() -> bool + Sync)) {
+pub fn minimize(block: &mut WorkingSet, free: &[usize], stop: &(dyn Fn() -> bool + Sync)) {
     let m = free.len();
     let mut kernel = Mat::from_fn(m, m, |a, b| block.row(free[a])[free[b]]);
-    let mut state = State {
+    let mut state = FreePoints {
         slope: (free.iter())
             .map(|&i| block.f[i] + block.params.epsilon * block.beta[i].signum())
             .collect(),
@@ -60,14 +60,14 @@ pub fn minimize(block: &mut Block, free: &[usize], stop: &(dyn Fn() -> bool + Sy
 }
 
 /// The free points, and which of them still are.
-struct State {
+struct FreePoints {
     slope: Vec<f64>,
     beta: Vec<f64>,
     c: f64,
     left: Vec<usize>,
 }
 
-impl State {
+impl FreePoints {
     /// -K⁻¹(g + λ1) over the points left, with λ so that the step sums to zero.
     fn direction(&self, factor: &Shrinking) -> Option<Vec<f64>> {
         let m = self.left.len() as f64;

@@ -16,7 +16,7 @@ const TINY: f64 = 1e-12;
 const LANES: usize = 8;
 
 /// Points with everything that is known about them.
-pub struct Block<'a> {
+pub struct WorkingSet<'a> {
     kernel: Cow<'a, [f64]>,
     diagonal: Vec<f64>,
     /// C, ε and when to stop.
@@ -33,7 +33,7 @@ pub struct Block<'a> {
     down: Vec<f64>,
 }
 
-impl<'a> Block<'a> {
+impl<'a> WorkingSet<'a> {
     /// All points, with coefficients of zero.
     pub fn new(problem: &Problem<'a>, params: &SvrParams) -> Self {
         let n = problem.y.len();
@@ -172,14 +172,14 @@ impl<'a> Block<'a> {
     }
 
     /// Some of the points as a block of their own.
-    pub fn part(&self, keep: &[usize]) -> Block<'static> {
+    pub fn part(&self, keep: &[usize]) -> WorkingSet<'static> {
         let pick = |list: &[f64]| -> Vec<f64> { keep.iter().map(|&k| list[k]).collect() };
         let mut kernel = Vec::with_capacity(keep.len() * keep.len());
         for &k in keep {
             let row = self.row(k);
             kernel.extend(keep.iter().map(|&j| row[j]));
         }
-        Block {
+        WorkingSet {
             kernel: Cow::Owned(kernel),
             diagonal: pick(&self.diagonal),
             params: self.params,
@@ -192,7 +192,7 @@ impl<'a> Block<'a> {
     }
 
     /// Takes over what a part has found.
-    pub fn absorb(&mut self, keep: &[usize], part: &Block) {
+    pub fn absorb(&mut self, keep: &[usize], part: &WorkingSet) {
         let moved: Vec<f64> = (keep.iter().zip(&part.beta))
             .map(|(&k, b)| b - self.beta[k])
             .collect();
@@ -300,7 +300,7 @@ impl<'a> Block<'a> {
         let n = self.len();
         let kernel = &self.kernel;
         let (ri, rj) = (&kernel[i * n..][..n], &kernel[j * n..][..n]);
-        let line = Line {
+        let line = KinkedLine {
             slope: self.f[i] + self.up[i] - self.f[j] - self.down[j],
             curvature: (self.diagonal[i] + self.diagonal[j] - 2.0 * ri[j]).max(TINY),
             kinks: [-self.beta[i], self.beta[j]],
@@ -319,7 +319,7 @@ impl<'a> Block<'a> {
 }
 
 wide! {
-    fn run<'a, 'b>(block: &'a mut Block<'b>, tolerance: f64, most: usize) -> usize {
+    fn run<'a, 'b>(block: &'a mut WorkingSet<'b>, tolerance: f64, most: usize) -> usize {
         block.steps(tolerance, most)
     }
 }
@@ -379,7 +379,7 @@ fn least(f: &[f64], up: &[f64]) -> Option<(usize, f64)> {
 }
 
 /// A convex function along a pair's direction: a parabola that gains slope at each kink.
-struct Line {
+struct KinkedLine {
     slope: f64,
     curvature: f64,
     /// Only those ahead (above zero) count.
@@ -388,7 +388,7 @@ struct Line {
     limit: f64,
 }
 
-impl Line {
+impl KinkedLine {
     #[inline(always)]
     fn minimum(&self) -> f64 {
         let [a, b] = self.kinks.map(|k| if k > 0.0 { k } else { f64::INFINITY });
@@ -431,7 +431,7 @@ mod tests {
 
     #[test]
     fn a_step_stops_at_kinks_and_bounds() {
-        let line = Line {
+        let line = KinkedLine {
             slope: -3.0,
             curvature: 1.0,
             kinks: [1.0, f64::INFINITY],
@@ -439,7 +439,7 @@ mod tests {
             limit: 10.0,
         };
         assert!((line.minimum() - 2.0).abs() < 1e-15); // -3 + 1 + 1 = -1 left after the kink at 1
-        assert!((Line { jump: 5.0, ..line }.minimum() - 1.0).abs() < 1e-15);
+        assert!((KinkedLine { jump: 5.0, ..line }.minimum() - 1.0).abs() < 1e-15);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::mesh::TriMesh;
 /// A vertex of a [`Solid`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Vertex {
+pub struct GpuVertex {
     /// m.
     pub position: [f32; 3],
     pub normal: [f32; 3],
@@ -15,7 +15,7 @@ pub struct Vertex {
 
 /// Triangles to be drawn.
 pub struct Solid {
-    pub vertices: Vec<Vertex>,
+    pub vertices: Vec<GpuVertex>,
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -25,7 +25,7 @@ impl Solid {
         let vertices = mesh.positions().iter().zip(mesh.vertex_normals());
         Self {
             vertices: vertices
-                .map(|(p, n)| Vertex {
+                .map(|(p, n)| GpuVertex {
                     position: p.as_vec3().to_array(),
                     normal: n.as_vec3().to_array(),
                     stretch: 0.0,

@@ -2,7 +2,7 @@
 
 use eframe::wgpu;
 
-use super::data::{Shown, Vertex};
+use super::data::{GpuVertex, Shown};
 
 pub(super) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -51,7 +51,7 @@ pub(super) fn layout(device: &wgpu::Device, scene: bool) -> wgpu::BindGroupLayou
 
 /// Which walls a pipeline draws.
 #[derive(Clone, Copy, PartialEq)]
-enum Walls {
+enum WallPass {
     /// Both sides: through the windows the inside is seen.
     All,
     FacingAway,
@@ -72,9 +72,9 @@ impl Pipelines {
         });
         let of = |walls| scene_pipeline(device, scene, &shader, walls);
         Self {
-            whole: of(Walls::All),
-            away: of(Walls::FacingAway),
-            ghost: of(Walls::Ghost),
+            whole: of(WallPass::All),
+            away: of(WallPass::FacingAway),
+            ghost: of(WallPass::Ghost),
             blit: blit_pipeline(device, blit, window),
         }
     }
@@ -84,9 +84,9 @@ fn scene_pipeline(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     shader: &wgpu::ShaderModule,
-    walls: Walls,
+    walls: WallPass,
 ) -> wgpu::RenderPipeline {
-    let ghost = walls == Walls::Ghost;
+    let ghost = walls == WallPass::Ghost;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("limb"),
         bind_group_layouts: &[Some(layout)],
@@ -109,15 +109,15 @@ fn scene_pipeline(
             entry_point: Some("vs"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             buffers: &[
-                buffer(size_of::<Vertex>() as u64, &fixed),
+                buffer(size_of::<GpuVertex>() as u64, &fixed),
                 buffer(size_of::<Shown>() as u64, &changing),
             ],
         },
         primitive: wgpu::PrimitiveState {
             cull_mode: match walls {
-                Walls::All => None,
-                Walls::FacingAway => Some(wgpu::Face::Front),
-                Walls::Ghost => Some(wgpu::Face::Back),
+                WallPass::All => None,
+                WallPass::FacingAway => Some(wgpu::Face::Front),
+                WallPass::Ghost => Some(wgpu::Face::Back),
             },
             ..Default::default()
         },

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::gathering::Gathering;
-use crate::link::{SessionEvent, State};
-use crate::live::{Health, ShownEstimator, Traffic, Update};
+use crate::link::{ConnectionState, SessionEvent};
+use crate::live::{Health, LiveUpdate, ShownEstimator, Traffic};
 use crate::wire::Hello;
 
 /// How long a trail lasts, and strips reach back (s).
@@ -41,9 +41,9 @@ pub struct Recording {
 /// Everything that is shown of a connection.
 #[derive(Default)]
 pub struct Feed {
-    pub state: Option<State>,
+    pub state: Option<ConnectionState>,
     pub hello: Option<Hello>,
-    pub update: Option<Update>,
+    pub update: Option<LiveUpdate>,
     pub health: Vec<Health>,
     pub used: Vec<bool>,
     pub noise: Vec<f64>,
@@ -73,10 +73,10 @@ pub struct Feed {
 }
 
 /// Shared with the listening thread.
-pub type Shared = Arc<Mutex<Feed>>;
+pub type FeedShared = Arc<Mutex<Feed>>;
 
 /// Takes in what happened on the line, and wakes the window when there is something to see.
-pub fn hear(feed: &Shared, event: &SessionEvent, wake: &dyn Fn()) {
+pub fn hear(feed: &FeedShared, event: &SessionEvent, wake: &dyn Fn()) {
     let Ok(mut feed) = feed.lock() else {
         return;
     };
@@ -95,10 +95,10 @@ impl Feed {
         match event {
             SessionEvent::State(state) => {
                 self.state = Some((*state).clone());
-                if **state == State::Waiting {
+                if **state == ConnectionState::Waiting {
                     self.trouble = None;
                 }
-                if **state != State::Live {
+                if **state != ConnectionState::Live {
                     self.update = None;
                     self.trail.clear();
                 }
@@ -166,7 +166,7 @@ impl Feed {
         }
     }
 
-    fn sample(&mut self, update: &Update) {
+    fn sample(&mut self, update: &LiveUpdate) {
         let now = update.time_us as f64 * 1e-6;
         // A clock that began anew.
         if self.strips.back().is_some_and(|s| s.seconds > now + 1.0) {
@@ -229,9 +229,9 @@ mod tests {
     fn why_a_board_is_not_understood_stays_until_it_is_asked_anew() {
         let mut feed = Feed::default();
         assert!(feed.take(&SessionEvent::Trouble("version 2")));
-        feed.take(&SessionEvent::State(&State::Silent));
+        feed.take(&SessionEvent::State(&ConnectionState::Silent));
         assert_eq!(feed.trouble.as_deref(), Some("version 2"));
-        feed.take(&SessionEvent::State(&State::Waiting));
+        feed.take(&SessionEvent::State(&ConnectionState::Waiting));
         assert_eq!(feed.trouble, None);
     }
 

@@ -13,7 +13,7 @@ use crate::session::jobs::Task;
 use crate::session::slot::{Slot, current};
 use crate::session::state::Session;
 use crate::session::state::live::KnownTouch;
-use crate::uncertainty::{Pressing, Uncertainty};
+use crate::uncertainty::{HandPressing, Uncertainty};
 
 /// How many are proposed, and how many a calibration takes at least.
 pub const WANTED: usize = crate::design::PROPOSED;
@@ -174,7 +174,7 @@ impl Session {
             ..self.document.state.project.uncertainty()
         };
         if self.live.exact {
-            off.pressing = Pressing::EXACT;
+            off.pressing = HandPressing::EXACT;
         }
         off
     }

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use crate::budget::{Quality, Watch, report};
 use crate::design::{DesignError, Inputs, Sensing};
-use crate::inference::{Features, Lessons, Trained};
+use crate::inference::{Features, LiveLessons, TrainedLive};
 use crate::regression::Hyper;
 
 /// The trained estimators: normalized, raw.
-pub type Pair = [Option<Arc<Trained>>; 2];
+pub type TrainedPair = [Option<Arc<TrainedLive>>; 2];
 
 /// How many touches they learn from.
 #[must_use]
@@ -27,11 +27,11 @@ pub fn train(
     noise: f64,
     count: usize,
     watch: Watch,
-) -> Result<Pair, DesignError> {
+) -> Result<TrainedPair, DesignError> {
     const JITTER: f64 = 0.03;
     report(watch, "Training", 0, 3)?;
     let lesson = sensing.lessons(inputs, count, inputs.project.budget.seed)?;
-    let lessons = Lessons {
+    let lessons = LiveLessons {
         x: &lesson.x,
         places_mm: &lesson.places_mm,
         forces: &lesson.forces,
@@ -47,11 +47,11 @@ pub fn train(
         gamma: keys.gamma,
     };
     report(watch, "Training", 1, 3)?;
-    let normalized = Trained::train(Features::Normalized, &lessons, &hyper);
+    let normalized = TrainedLive::train(Features::Normalized, &lessons, &hyper);
     report(watch, "Training", 2, 3)?;
-    let raw = Trained::train(
+    let raw = TrainedLive::train(
         Features::Raw,
-        &Lessons {
+        &LiveLessons {
             jitter: 0.0,
             ..lessons
         },

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::bench::{Ended, News};
+use crate::bench::{CollectorNews, RunEnd};
 use crate::document::SensingInputs;
 use crate::link::BenchOrder;
 use crate::test_bed::{BenchRequest, Ready};
@@ -62,7 +62,7 @@ pub enum PressState {
 }
 
 /// A plan, and how far it has come.
-pub struct Pressing {
+pub struct PressingPlan {
     pub inputs: PlanInputs,
     pub ready: Arc<Ready>,
     /// In the order of its presses.
@@ -75,7 +75,7 @@ pub struct Pressing {
     counts: [usize; 2],
 }
 
-impl Pressing {
+impl PressingPlan {
     /// How many words of it are kept.
     const SAID: usize = 6;
 
@@ -140,34 +140,37 @@ impl Pressing {
         }
     }
 
-    pub(in crate::session) fn hear(&mut self, news: News) {
+    pub(in crate::session) fn hear(&mut self, news: CollectorNews) {
         match news {
-            News::Begun(number) => {
+            CollectorNews::Begun(number) => {
                 self.let_go();
                 match number {
                     Some(number) => self.set(number, PressState::Now),
                     None => self.checking = true,
                 }
             }
-            News::Press { number, failed } => {
+            CollectorNews::Press { number, failed } => {
                 let state = failed.map_or(PressState::Made, PressState::Failed);
                 self.set(number, state);
             }
-            News::Discarded(numbers) => {
+            CollectorNews::Discarded(numbers) => {
                 for number in numbers {
                     self.set(number, PressState::ToCome);
                 }
             }
-            News::Say(text) => self.say(text),
-            News::Answer(_) | News::Note(_) | News::Keep | News::Waits => {}
+            CollectorNews::Say(text) => self.say(text),
+            CollectorNews::Answer(_)
+            | CollectorNews::Note(_)
+            | CollectorNews::Keep
+            | CollectorNews::Waits => {}
         }
     }
 
-    pub(in crate::session) fn end(&mut self, ended: &Ended) {
+    pub(in crate::session) fn end(&mut self, ended: &RunEnd) {
         self.let_go();
         match ended {
-            Ended::Finished => self.say("all presses were tried"),
-            Ended::Stopped(why) => self.say(why),
+            RunEnd::Finished => self.say("all presses were tried"),
+            RunEnd::Stopped(why) => self.say(why),
         }
     }
 }
@@ -175,7 +178,7 @@ impl Pressing {
 /// The bench: its plan, shared with whoever goes through it, and who gives that orders.
 #[derive(Default)]
 pub struct Bench {
-    pub(in crate::session) pressing: Arc<Mutex<Option<Pressing>>>,
+    pub(in crate::session) pressing: Arc<Mutex<Option<PressingPlan>>>,
     pub(in crate::session) orders: Option<Sender<BenchOrder>>,
     pub paused: bool,
     /// Whether a run is made ready or pressed: until its thread has ended, whatever has become of its job.
@@ -185,29 +188,29 @@ pub struct Bench {
 }
 
 /// Something goes on as long as this is held.
-pub(in crate::session) struct Held(Arc<AtomicBool>);
+pub(in crate::session) struct HoldGuard(Arc<AtomicBool>);
 
-impl Held {
+impl HoldGuard {
     pub fn new(what: &Arc<AtomicBool>) -> Self {
         what.store(true, Ordering::SeqCst);
         Self(Arc::clone(what))
     }
 }
 
-impl Drop for Held {
+impl Drop for HoldGuard {
     fn drop(&mut self) {
         self.0.store(false, Ordering::SeqCst);
     }
 }
 
 impl Bench {
-    pub(in crate::session) fn locked(&self) -> MutexGuard<'_, Option<Pressing>> {
+    pub(in crate::session) fn locked(&self) -> MutexGuard<'_, Option<PressingPlan>> {
         locked(&self.pressing)
     }
 
     /// What is planned, and how far it has come.
     #[must_use]
-    pub fn look<T>(&self, at: impl FnOnce(&Pressing) -> T) -> Option<T> {
+    pub fn look<T>(&self, at: impl FnOnce(&PressingPlan) -> T) -> Option<T> {
         self.locked().as_ref().map(at)
     }
 
@@ -239,7 +242,7 @@ impl Bench {
 
 /// What others have left of it, whatever befell them.
 pub(in crate::session) fn locked(
-    pressing: &Mutex<Option<Pressing>>,
-) -> MutexGuard<'_, Option<Pressing>> {
+    pressing: &Mutex<Option<PressingPlan>>,
+) -> MutexGuard<'_, Option<PressingPlan>> {
     pressing.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -6,9 +6,9 @@ use glam::DVec3;
 
 use crate::design::InHand;
 use crate::document::ExpectedInputs;
-use crate::placement::expected_error::{Mistaken, Pair};
+use crate::placement::expected_error::{Mistaken, MistakenPair};
 use crate::project::ChosenSite;
-use crate::session::latest::{Desk, Latest};
+use crate::session::latest::{Latest, LatestDesk};
 use crate::session::slot::Slot;
 
 pub(in crate::session) const BROKEN: &str =
@@ -22,7 +22,7 @@ pub(in crate::session) struct ConfusionInputs {
 }
 
 /// What the press nearest to the pointer is taken for by a set.
-pub(in crate::session) struct Question {
+pub(in crate::session) struct ConfusionQuestion {
     pub(in crate::session) in_hand: Arc<InHand>,
     pub(in crate::session) set: Vec<usize>,
     pub(in crate::session) press: usize,
@@ -31,7 +31,7 @@ pub(in crate::session) struct Question {
 }
 
 /// What a press is taken for.
-pub struct Taken {
+pub struct TakenFor {
     pub(in crate::session) press: usize,
     /// Where it really is (m).
     pub place: DVec3,
@@ -41,17 +41,20 @@ pub struct Taken {
 /// Confusions, and the worker that finds what a press is taken for.
 #[derive(Default)]
 pub struct Confusions {
-    pub(in crate::session) worker: Option<Latest<Question, Taken>>,
+    pub(in crate::session) worker: Option<Latest<ConfusionQuestion, TakenFor>>,
     /// What is pointed at, and by which gauges: where neither has changed nothing is asked.
     pub(in crate::session) asked: Option<(usize, ConfusionInputs)>,
-    pub(in crate::session) answer: Option<Taken>,
+    pub(in crate::session) answer: Option<TakenFor>,
     /// The worst.
-    pub(in crate::session) pairs: Option<Slot<ConfusionInputs, Arc<Vec<Pair>>>>,
+    pub(in crate::session) pairs: Option<Slot<ConfusionInputs, Arc<Vec<MistakenPair>>>>,
 }
 
-pub(in crate::session) fn serve(first: Question, desk: &Desk<Question, Taken>) -> Option<Question> {
+pub(in crate::session) fn serve(
+    first: ConfusionQuestion,
+    desk: &LatestDesk<ConfusionQuestion, TakenFor>,
+) -> Option<ConfusionQuestion> {
     let question = desk.latest(first);
-    desk.answer(Ok(Taken {
+    desk.answer(Ok(TakenFor {
         press: question.press,
         place: question.place,
         taken: question.in_hand.taken_for(&question.set, question.press),

@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-use crate::design::{Expected, InHand};
+use crate::design::{ExpectedInHand, InHand};
 use crate::document::ExpectedInputs;
 use crate::plain::robust_top;
 use crate::project::ChosenSite;
-use crate::session::latest::{Desk, Latest};
+use crate::session::latest::{Latest, LatestDesk};
 use crate::session::slot::Slot;
 
 pub(in crate::session) const BROKEN: &str =
     "An internal error stopped the expected error of the gauges. Please report it";
 
 /// A set of gauges, one of which is in hand.
-pub(in crate::session) struct Question {
+pub(in crate::session) struct HandQuestion {
     /// What it is asked of, and the number that this goes by.
     pub(in crate::session) ready: u64,
     pub(in crate::session) in_hand: Arc<InHand>,
@@ -28,7 +28,7 @@ pub(in crate::session) struct Question {
     pub(in crate::session) known: bool,
 }
 
-impl Question {
+impl HandQuestion {
     /// Whether at most the gauge in hand is elsewhere.
     pub(in crate::session) fn continues(&self, before: &Self) -> bool {
         let stays = |k: usize| k == self.moves || self.set[k] == before.set[k];
@@ -43,7 +43,7 @@ pub struct ExpectedOf {
     pub(in crate::session) sites: Vec<ChosenSite>,
     /// Of the question.
     pub(in crate::session) number: u64,
-    pub expected: Expected,
+    pub expected: ExpectedInHand,
     /// Where the colours of its map end (mm).
     pub top_mm: f64,
 }
@@ -55,7 +55,7 @@ pub struct Expecting {
     pub(in crate::session) ready: Option<Slot<ExpectedInputs, Arc<InHand>>>,
     /// Counts what sets were asked of so far.
     pub(in crate::session) number: u64,
-    pub(in crate::session) worker: Option<Latest<Question, ExpectedOf>>,
+    pub(in crate::session) worker: Option<Latest<HandQuestion, ExpectedOf>>,
     /// What was asked last: of what, which sites, and which gauge of them moves.
     pub(in crate::session) asked: Option<(u64, Vec<ChosenSite>, usize)>,
     /// How many questions wanted an answer.
@@ -67,9 +67,9 @@ pub struct Expecting {
 
 /// Answers questions on the same other gauges; returns the first that has others.
 pub(in crate::session) fn serve(
-    first: Question,
-    desk: &Desk<Question, ExpectedOf>,
-) -> Option<Question> {
+    first: HandQuestion,
+    desk: &LatestDesk<HandQuestion, ExpectedOf>,
+) -> Option<HandQuestion> {
     let (ready, in_hand) = (first.ready, Arc::clone(&first.in_hand));
     let mut question = desk.latest(first);
     if question.ready != ready {
@@ -111,7 +111,7 @@ mod tests {
         let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
         let in_hand = Arc::new(InHand::new(&inputs, Arc::clone(&simulated), &unwatched).unwrap());
         let count = simulated.dataset.sites.len();
-        let question = |k: usize| Question {
+        let question = |k: usize| HandQuestion {
             ready: 1,
             in_hand: Arc::clone(&in_hand),
             sites: Vec::new(),
@@ -121,7 +121,7 @@ mod tests {
             known: false,
         };
         assert!(question(5).continues(&question(0)));
-        let other = Question {
+        let other = HandQuestion {
             moves: 3,
             ..question(5)
         };
@@ -154,7 +154,7 @@ mod tests {
             assert!(answer.top_mm > 0.0);
         }
         // Taking another gauge in hand tells nothing new; its first move does.
-        let taken = |k: usize, known: bool| Question {
+        let taken = |k: usize, known: bool| HandQuestion {
             moves: 3,
             known,
             ..question(k)

@@ -8,12 +8,12 @@ use glam::DVec3;
 use crate::design::Sensing;
 use crate::document::SensingInputs;
 use crate::inference::KnownPress;
-use crate::link::{Address, Connection, Hosted, ListenerCommand, State};
-use crate::live::Update;
+use crate::link::{Address, Connection, ConnectionState, Hosted, ListenerCommand};
+use crate::live::LiveUpdate;
 use crate::project::LiveKeys;
-use crate::session::live::feed::{Feed, Shared};
+use crate::session::live::feed::{Feed, FeedShared};
 use crate::session::live::gathering::{Awaited, Gathered};
-use crate::session::live::training::Pair;
+use crate::session::live::training::TrainedPair;
 use crate::session::slot::Slot;
 use crate::session::state::learned::Learnt;
 
@@ -37,7 +37,7 @@ pub struct KnownTouch {
 }
 
 /// Trained estimators, and the gauges that they were trained for.
-pub(in crate::session) type TrainedFor = (Vec<bool>, Pair);
+pub(in crate::session) type TrainedFor = (Vec<bool>, TrainedPair);
 
 /// A connection, and what is known of the gauges that it reads.
 #[derive(Default)]
@@ -47,7 +47,7 @@ pub struct Live {
     pub(in crate::session) connection: Option<Connection>,
     /// A simulated board of our own.
     pub(in crate::session) hosted: Option<Hosted>,
-    pub(in crate::session) feed: Shared,
+    pub(in crate::session) feed: FeedShared,
     pub(in crate::session) target: Option<Target>,
     /// Known touches, with the gauges that read them: of others they say nothing.
     pub(in crate::session) known: Vec<Slot<SensingInputs, KnownTouch>>,
@@ -95,14 +95,14 @@ impl Live {
 
     /// How the connection stands; nothing where there is none.
     #[must_use]
-    pub fn state(&self) -> Option<State> {
+    pub fn state(&self) -> Option<ConnectionState> {
         self.connection.as_ref()?;
         self.look(|feed| feed.state.clone()).flatten()
     }
 
     /// What the last sample said.
     #[must_use]
-    pub fn update(&self) -> Option<Update> {
+    pub fn update(&self) -> Option<LiveUpdate> {
         self.look(|feed| feed.update.clone()).flatten()
     }
 

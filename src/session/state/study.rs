@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::io::study_folder::in_a_cell;
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
-use crate::varied::{Base, Collected};
+use crate::varied::{CollectedUnits, UnitBase};
 
 /// What all units have: the value of an axis, or a figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,16 +71,20 @@ fn range(values: &[f64]) -> Option<[f64; 2]> {
 
 /// A study whose results are looked at.
 pub struct OpenStudy {
-    pub collected: Collected,
+    pub collected: CollectedUnits,
     /// Axes first, then figures.
     pub columns: Vec<Column>,
-    pub(in crate::session) base: Base,
+    pub(in crate::session) base: UnitBase,
     /// Whether that is still what the study was planned from.
     pub(in crate::session) is_of_base: bool,
 }
 
 impl OpenStudy {
-    pub(in crate::session) fn new(collected: Collected, base: Base, is_of_base: bool) -> Self {
+    pub(in crate::session) fn new(
+        collected: CollectedUnits,
+        base: UnitBase,
+        is_of_base: bool,
+    ) -> Self {
         let rows = &collected.rows;
         let axes = collected.keys().enumerate().map(|(k, key)| {
             let values: Vec<&Value> = rows.iter().map(|row| &row.values[k]).collect();
@@ -88,7 +92,7 @@ impl OpenStudy {
         });
         let aim = &collected.folder.study.aim;
         let figures = collected.names.iter().map(|name| {
-            let value = |row: &crate::varied::Row| row.figures.get(name).copied();
+            let value = |row: &crate::varied::UnitRow| row.figures.get(name).copied();
             let values: Vec<f64> = rows
                 .iter()
                 .map(|row| value(row).unwrap_or(f64::NAN))

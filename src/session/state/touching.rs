@@ -9,11 +9,11 @@ use crate::elasticity::observe::{Face, Observer};
 use crate::elasticity::{Model, Touch};
 use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
-use crate::session::latest::{Desk, Latest};
+use crate::session::latest::{Latest, LatestDesk};
 use crate::session::slot::Slot;
 
 /// What a touch did, at every vertex of the part.
-pub struct Touched {
+pub struct TouchEffect {
     pub touch: Touch,
     /// m.
     pub displacement: Vec<DVec3>,
@@ -42,7 +42,7 @@ pub(in crate::session) fn exaggeration(part: &TriMesh, largest: f64) -> Option<f
     round.into_iter().find(|s| *s <= wanted)
 }
 
-pub(in crate::session) struct Request {
+pub(in crate::session) struct TouchRequest {
     pub(in crate::session) model: ModelInputs,
     pub(in crate::session) inputs: Inputs,
     pub(in crate::session) touch: Touch,
@@ -54,9 +54,9 @@ pub(in crate::session) const BROKEN: &str =
 /// The touch that is shown, and the worker that computes it.
 #[derive(Default)]
 pub struct Touching {
-    pub(in crate::session) worker: Option<Latest<Request, Slot<ModelInputs, Touched>>>,
+    pub(in crate::session) worker: Option<Latest<TouchRequest, Slot<ModelInputs, TouchEffect>>>,
     pub(in crate::session) waiting: bool,
-    pub(in crate::session) result: Option<Slot<ModelInputs, Touched>>,
+    pub(in crate::session) result: Option<Slot<ModelInputs, TouchEffect>>,
     /// Counts results, so that whoever draws them knows when to do so anew.
     pub version: u64,
 }
@@ -64,7 +64,7 @@ pub struct Touching {
 impl Touching {
     /// The touch that is shown.
     #[must_use]
-    pub fn result(&self) -> Option<&Touched> {
+    pub fn result(&self) -> Option<&TouchEffect> {
         self.result.as_ref().map(|slot| &slot.value)
     }
 
@@ -74,7 +74,7 @@ impl Touching {
         self.waiting
     }
 
-    pub(in crate::session) fn show(&mut self, result: Option<Slot<ModelInputs, Touched>>) {
+    pub(in crate::session) fn show(&mut self, result: Option<Slot<ModelInputs, TouchEffect>>) {
         self.result = result;
         self.version += 1;
     }
@@ -82,9 +82,9 @@ impl Touching {
 
 /// Answers requests on one model; returns the first that needs another.
 pub(in crate::session) fn serve(
-    first: Request,
-    desk: &Desk<Request, Slot<ModelInputs, Touched>>,
-) -> Option<Request> {
+    first: TouchRequest,
+    desk: &LatestDesk<TouchRequest, Slot<ModelInputs, TouchEffect>>,
+) -> Option<TouchRequest> {
     let model = match build(&first.inputs) {
         Ok(model) => model,
         Err(error) => {
@@ -120,8 +120,8 @@ pub(in crate::session) fn build(inputs: &Inputs) -> Result<Box<dyn Model>, Desig
 pub(in crate::session) fn solve(
     model: &dyn Model,
     observer: &Observer,
-    request: &Request,
-) -> Touched {
+    request: &TouchRequest,
+) -> TouchEffect {
     let u = model.press(&request.touch);
     let displacement: Vec<DVec3> = observer.displacement_of(model, &u);
     let strain = observer
@@ -138,7 +138,7 @@ pub(in crate::session) fn solve(
     let scale = exaggeration.unwrap_or(0.0);
     let moved = part.positions().iter().zip(&displacement);
     let shown = moved.map(|(p, u)| *p + *u * scale).collect();
-    Touched {
+    TouchEffect {
         touch: request.touch,
         largest,
         exaggeration,

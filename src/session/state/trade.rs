@@ -4,14 +4,14 @@ use std::sync::{Arc, Mutex};
 
 use crate::budget::Quality;
 use crate::document::TradeInputs;
-use crate::io::trade_file::Record;
+use crate::io::trade_file::TradeRecord;
 
 /// Beyond this factor a prediction was wrong.
 pub(in crate::session) const WRONG: f64 = 2.0;
 
 /// Where a trade was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::session) enum Place {
+pub(in crate::session) enum MeasuredOn {
     Here,
     /// With the bundled limb.
     Elsewhere,
@@ -20,11 +20,11 @@ pub(in crate::session) enum Place {
 /// What is known of the open project.
 #[derive(Default)]
 pub struct Trade {
-    pub(in crate::session) record: Option<(Arc<Record>, Place)>,
+    pub(in crate::session) record: Option<(Arc<TradeRecord>, MeasuredOn)>,
     /// What it was looked up for.
     pub(in crate::session) inputs: Option<TradeInputs>,
     /// What the measurement that is running, or was ended, has so far.
-    pub(in crate::session) coming: Arc<Mutex<Option<Record>>>,
+    pub(in crate::session) coming: Arc<Mutex<Option<TradeRecord>>>,
     /// How the last prediction came out.
     pub(in crate::session) promise: Option<Promise>,
 }

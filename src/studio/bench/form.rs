@@ -8,7 +8,7 @@ use super::super::form::{counted, quantity, rows};
 use super::super::learned::estimator_shown;
 use super::super::theme;
 use crate::plain;
-use crate::session::{BenchDesk, PressState, Pressing};
+use crate::session::{BenchDesk, PressState, PressingPlan};
 use crate::test_bed::{BenchRequest, Flaws};
 
 /// Failed presses that are named.
@@ -167,7 +167,7 @@ fn file_rows(ui: &mut Ui, desk: &mut BenchDesk) {
 }
 
 /// What is planned, how far it has come, and what was said of it.
-fn progress(ui: &mut Ui, plan: &Pressing) {
+fn progress(ui: &mut Ui, plan: &PressingPlan) {
     let [made, failed] = plan.made_and_failed();
     let all = plan.states.len();
     let share = (made + failed) as f32 / all.max(1) as f32;

@@ -3,11 +3,11 @@
 use egui::{Align2, Color32, Painter, Pos2, Shape, Stroke, pos2, vec2};
 use glam::DVec3;
 
-use super::super::paint::{Look, label};
+use super::super::paint::{LimbLook, label};
 use super::super::theme;
 use super::super::view::{Pane, Stage};
 use crate::bench::Planned;
-use crate::session::{PressState, Pressing};
+use crate::session::{PressState, PressingPlan};
 
 const TO_COME: Color32 = Color32::from_rgb(222, 226, 232);
 /// Told apart from what failed by shape, too.
@@ -17,7 +17,7 @@ const FAILED: Color32 = Color32::from_rgb(213, 94, 0);
 const DOT: f32 = 3.2;
 
 /// Draws the plan while the stage is looked at.
-pub fn paint_bench(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_bench(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     if look.view.stage != Stage::Bench {
         return;
     }
@@ -32,7 +32,7 @@ pub fn paint_bench(look: Look<'_>, painter: &Painter, pane: Pane) {
     }
 }
 
-fn paint_presses(look: Look<'_>, painter: &Painter, pane: Pane, plan: &Pressing) {
+fn paint_presses(look: LimbLook<'_>, painter: &Painter, pane: Pane, plan: &PressingPlan) {
     let toward = look.view.camera.toward_eye();
     let place = look.scene.placing(look.view, pane);
     let rect = look.view.rect_of(pane);
@@ -73,10 +73,10 @@ fn cross(painter: &Painter, at: Pos2) {
 
 /// What is pressed just now, with the tip on its way to it.
 fn paint_now(
-    look: Look<'_>,
+    look: LimbLook<'_>,
     painter: &Painter,
     pane: Pane,
-    plan: &Pressing,
+    plan: &PressingPlan,
     press: &Planned,
     at: Pos2,
 ) {
@@ -99,7 +99,7 @@ fn paint_now(
 }
 
 /// The axis that the machine turns the limb about, and where its tip comes from at angle zero: how the limb stands in it.
-fn paint_table(look: Look<'_>, painter: &Painter, plan: &Pressing) {
+fn paint_table(look: LimbLook<'_>, painter: &Painter, plan: &PressingPlan) {
     /// Of the axis beyond the limb, over its length.
     const BEYOND: f64 = 0.12;
     let mount = &plan.ready.mount;
@@ -131,7 +131,7 @@ fn paint_table(look: Look<'_>, painter: &Painter, plan: &Pressing) {
     }
 }
 
-fn paint_key(look: Look<'_>, painter: &Painter) {
+fn paint_key(look: LimbLook<'_>, painter: &Painter) {
     let rect = look.view.rect;
     let entries = [
         (PressState::ToCome, "to come"),

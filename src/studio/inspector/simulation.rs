@@ -5,9 +5,9 @@ use egui::{RichText, Ui};
 use super::super::ask::Ask;
 use super::super::form::{choice, count, counted, number, quantity, rows};
 use super::super::view::Tab;
-use crate::budget::{Limits, Quality};
+use crate::budget::{BudgetLimits, Quality};
 use crate::dataset::Signal;
-use crate::project::{BudgetKeys, GaugeKeys, Lattice, PartModel, Project, SiteKeys, TouchKeys};
+use crate::project::{BudgetKeys, GaugeKeys, PartModel, Project, SiteKeys, SiteLattice, TouchKeys};
 
 /// The settings of the simulation.
 pub fn simulation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -33,7 +33,7 @@ fn quality(ui: &mut Ui, project: &mut Project) {
             ui.label("Limits of its own hold")
                 .on_hover_text("budget.limits in the project's file");
             if ui.button("Lift limits").clicked() {
-                project.budget.limits = Limits::default();
+                project.budget.limits = BudgetLimits::default();
             }
         });
     }
@@ -145,14 +145,14 @@ fn sites(ui: &mut Ui, project: &mut Project) {
         0.05,
     );
     let name = |l| match l {
-        Lattice::Even => "Even",
-        Lattice::Unrolled => "Rows and columns",
+        SiteLattice::Even => "Even",
+        SiteLattice::Unrolled => "Rows and columns",
     };
     choice(
         ui,
         "Lattice",
         &mut project.sites.lattice,
-        &[Lattice::Even, Lattice::Unrolled],
+        &[SiteLattice::Even, SiteLattice::Unrolled],
         name,
         &SiteKeys::lattice().sentence(),
     );

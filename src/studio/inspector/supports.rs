@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::Ui;
 
-use super::super::action::Change;
+use super::super::action::ProjectChange;
 use super::super::ask::Ask;
 use super::super::form::{choice, number, rows};
 use super::super::view::Tool;
@@ -27,7 +27,7 @@ pub fn supports_form(ask: &mut Ask<'_>, ui: &mut Ui) {
         .button("Paint a support")
         .on_hover_text("Another support, on the vertices that you paint next");
     if paint.clicked() {
-        ask.act(Change::AddPaintedSupport);
+        ask.act(ProjectChange::AddPaintedSupport);
         ask.view.layer = Layer::Support;
         ask.view.take(Tool::Paint);
     }

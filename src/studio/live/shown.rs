@@ -6,11 +6,11 @@ use egui::{Align2, Color32, Painter, Rect, RichText, Role, Stroke, Ui, WidgetInf
 use glam::DVec3;
 
 use super::super::ask::Ask;
-use super::super::paint::{Look, label};
+use super::super::paint::{LimbLook, label};
 use super::super::theme;
 use super::super::view::{Pane, Stage};
 use super::super::words::live_in_words;
-use crate::inference::{Contact, Kind, Touches};
+use crate::inference::{Contact, SeveralTouches, TouchKind};
 use crate::live::{Health, ShownEstimator};
 use crate::session::{Feed, STRIPS_S, Strip};
 
@@ -30,7 +30,7 @@ fn colour(estimator: ShownEstimator) -> Color32 {
 }
 
 /// What is heard of a touch, over the limb.
-pub fn paint_live(look: Look<'_>, painter: &Painter, pane: Pane) {
+pub fn paint_live(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     paint_known(look, painter, pane);
     paint_proposed(look, painter, pane);
     look.session
@@ -38,7 +38,7 @@ pub fn paint_live(look: Look<'_>, painter: &Painter, pane: Pane) {
         .look(|feed| paint_heard(look, painter, pane, feed));
 }
 
-fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
+fn paint_heard(look: LimbLook<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
     let Some(update) = &feed.update else {
         return;
     };
@@ -86,10 +86,10 @@ fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
 
 /// All that touch: points with where they may be, or an area.
 fn paint_touches(
-    look: Look<'_>,
+    look: LimbLook<'_>,
     painter: &Painter,
     pane: Pane,
-    touches: &Touches,
+    touches: &SeveralTouches,
     colour: Color32,
 ) {
     for contact in &touches.contacts {
@@ -97,7 +97,7 @@ fn paint_touches(
             continue;
         };
         paint_outline(look, painter, pane, (contact, contact.region.axes), colour);
-        if let Kind::Area(radius) = touches.kind {
+        if let TouchKind::Area(radius) = touches.kind {
             let along = contact.normal.any_orthonormal_vector() * radius;
             let axes = [along, contact.normal.cross(along)];
             paint_outline(look, painter, pane, (contact, axes), colour);
@@ -112,7 +112,7 @@ fn paint_touches(
 
 /// The press as an arrow that it comes along, with how hard and how sure.
 fn paint_press(
-    look: Look<'_>,
+    look: LimbLook<'_>,
     painter: &Painter,
     place: DVec3,
     force: f64,
@@ -158,7 +158,7 @@ fn paint_press(
 
 /// An ellipse around a touch, laid onto the surface: the 90 % region, or an area.
 fn paint_outline(
-    look: Look<'_>,
+    look: LimbLook<'_>,
     painter: &Painter,
     pane: Pane,
     (contact, [a, b]): (&Contact, [DVec3; 2]),
@@ -188,7 +188,7 @@ fn paint_outline(
     }
 }
 
-fn paint_trail(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
+fn paint_trail(look: LimbLook<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
     let Some(&(now, _, _)) = feed.trail.back() else {
         return;
     };
@@ -211,7 +211,7 @@ fn paint_trail(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
 }
 
 /// Where known touches were pressed: crosses with their numbers, thin where they are left out.
-fn paint_known(look: Look<'_>, painter: &Painter, pane: Pane) {
+fn paint_known(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     if look.view.stage != Stage::Live || !look.session.live.is_connected() {
         return;
     }
@@ -241,7 +241,7 @@ fn paint_known(look: Look<'_>, painter: &Painter, pane: Pane) {
 }
 
 /// Where the next known touch is to be pressed.
-fn paint_proposed(look: Look<'_>, painter: &Painter, pane: Pane) {
+fn paint_proposed(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     let shown = look.view.stage == Stage::Live
         && look.session.live.is_connected()
         && look.session.live.simulated_board().is_none();
@@ -317,16 +317,16 @@ fn facts(ui: &mut Ui, feed: &Feed) {
 }
 
 /// What touches, where that is not simply one point.
-fn how_many(touches: &Touches) -> Option<String> {
+fn how_many(touches: &SeveralTouches) -> Option<String> {
     let sure = 100.0 * touches.probability;
     match (touches.kind, touches.contacts.len()) {
-        (Kind::Points, 1) => None,
-        (Kind::Points, count) => Some(format!("{count} touches ({sure:.0} % sure)")),
-        (Kind::Area(radius), _) => Some(format!(
+        (TouchKind::Points, 1) => None,
+        (TouchKind::Points, count) => Some(format!("{count} touches ({sure:.0} % sure)")),
+        (TouchKind::Area(radius), _) => Some(format!(
             "an area, {:.0} mm around its middle ({sure:.0} % sure)",
             radius * 1e3
         )),
-        (Kind::Unclear, _) => Some("something touches that is no point".into()),
+        (TouchKind::Unclear, _) => Some("something touches that is no point".into()),
     }
 }
 

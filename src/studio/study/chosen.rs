@@ -6,7 +6,7 @@ use std::sync::Arc;
 use egui::{Color32, Ui};
 
 use super::limb::Thumbnail;
-use super::raster::{Key, Raster};
+use super::raster::{Raster, RasterKey};
 use crate::session::OpenStudy;
 
 /// Designs that are in range, those that no other beats, and the others.
@@ -82,7 +82,7 @@ impl StudyView {
 }
 
 /// What a picture of these columns is of.
-pub fn key(view: &StudyView, size: [usize; 2], columns: &[usize], ui: &Ui) -> Key {
+pub fn key(view: &StudyView, size: [usize; 2], columns: &[usize], ui: &Ui) -> RasterKey {
     let ranges = view
         .ranges
         .iter()

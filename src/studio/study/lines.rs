@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Rect, Role, Sense, Stroke, Ui, Vec2, WidgetI
 
 use super::super::theme;
 use super::chosen::{FRONT, KEPT, REST, StudyView, key};
-use super::raster::{Canvas, pixels, show};
+use super::raster::{PixelCanvas, pixels, show};
 use crate::session::{Column, OpenStudy};
 
 /// Lines that are drawn of those that are kept, and of the others.
@@ -109,7 +109,7 @@ fn path(room: Vec2, heights: &[Option<f32>]) -> Vec<Vec2> {
 }
 
 fn draw(
-    canvas: &mut Canvas,
+    canvas: &mut PixelCanvas,
     study: &OpenStudy,
     kept: &[bool],
     heights: &dyn Fn(usize) -> Vec<Option<f32>>,

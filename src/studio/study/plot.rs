@@ -5,7 +5,7 @@ use egui_plot::{Plot, PlotImage, PlotPoint, PlotPoints, PlotResponse, Points};
 
 use super::super::theme::still;
 use super::chosen::{FRONT, KEPT, REST, StudyView, key};
-use super::raster::{Canvas, pixels};
+use super::raster::{PixelCanvas, pixels};
 use crate::session::{Column, OpenStudy};
 
 /// How near (points) the pointer must be to what it picks.
@@ -33,7 +33,7 @@ impl PlotFrame<'_> {
     }
 
     /// Draws all designs; what is kept lies over what is not.
-    fn draw(&self, canvas: &mut Canvas, study: &OpenStudy, kept: &[bool]) {
+    fn draw(&self, canvas: &mut PixelCanvas, study: &OpenStudy, kept: &[bool]) {
         let room = canvas.size();
         for over in [false, true] {
             for unit in (0..kept.len()).filter(|&unit| kept[unit] == over) {
@@ -94,7 +94,7 @@ fn plot(
 ) -> PlotResponse<()> {
     let size = ui.available_size() - vec2(0.0, 4.0);
     let key = key(view, pixels(ui.ctx(), size), &view.across, ui);
-    let draw = |canvas: &mut Canvas| frame.draw(canvas, study, kept);
+    let draw = |canvas: &mut PixelCanvas| frame.draw(canvas, study, kept);
     let picture = view.dots.of(key, ui.ctx(), draw).id();
     let [across, up] = frame.ranges;
     let middle = PlotPoint::new(

@@ -3,25 +3,25 @@
 use egui::{Color32, ColorImage, Context, Rect, TextureHandle, TextureOptions, Vec2};
 
 /// What a picture of a study is of: it is drawn anew when that changes.
-pub type Key = ([usize; 2], Vec<(usize, [u64; 2])>, Vec<usize>, bool);
+pub type RasterKey = ([usize; 2], Vec<(usize, [u64; 2])>, Vec<usize>, bool);
 
 /// A picture, and what it is of.
 #[derive(Default)]
 pub struct Raster {
-    known: Option<(Key, TextureHandle)>,
+    known: Option<(RasterKey, TextureHandle)>,
 }
 
 impl Raster {
     /// The picture of a key: the one that is known, or a new one.
     pub fn of(
         &mut self,
-        key: Key,
+        key: RasterKey,
         ctx: &Context,
-        draw: impl FnOnce(&mut Canvas),
+        draw: impl FnOnce(&mut PixelCanvas),
     ) -> &TextureHandle {
         let known = self.known.take().filter(|(known, _)| *known == key);
         let (key, picture) = known.unwrap_or_else(|| {
-            let mut canvas = Canvas::new(key.0);
+            let mut canvas = PixelCanvas::new(key.0);
             draw(&mut canvas);
             let picture = ctx.load_texture("study", canvas.image, TextureOptions::LINEAR);
             (key, picture)
@@ -37,11 +37,11 @@ pub fn pixels(ctx: &Context, size: Vec2) -> [usize; 2] {
 }
 
 /// Pixels that are drawn on.
-pub struct Canvas {
+pub struct PixelCanvas {
     image: ColorImage,
 }
 
-impl Canvas {
+impl PixelCanvas {
     fn new(size: [usize; 2]) -> Self {
         Self {
             image: ColorImage::filled(size, Color32::TRANSPARENT),
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn marks_stay_within_the_picture() {
-        let mut canvas = Canvas::new([20, 10]);
+        let mut canvas = PixelCanvas::new([20, 10]);
         canvas.dot(egui::vec2(0.0, 0.0), 3.0, Color32::RED);
         canvas.line(
             egui::vec2(-50.0, 5.0),

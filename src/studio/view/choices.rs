@@ -210,14 +210,14 @@ pub enum Gesture {
 
 /// A way on the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum ScreenWay {
     Left,
     Right,
     Up,
     Down,
 }
 
-impl Way {
+impl ScreenWay {
     pub const ALL: [Self; 4] = [Self::Left, Self::Right, Self::Up, Self::Down];
 
     #[must_use]
@@ -233,7 +233,7 @@ impl Way {
 
 /// What is cut away so that the inside can be seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Section {
+pub struct SectionPlane {
     /// The side of the part that is cut away.
     pub side: Direction,
     /// That way, of unit length, and from where on (m).
@@ -243,7 +243,7 @@ pub struct Section {
     pub flip: bool,
 }
 
-impl Section {
+impl SectionPlane {
     /// One half of a part, of which the box around it is given.
     #[must_use]
     pub fn halving(part: &OrientedBox, side: Direction, flip: bool) -> Self {

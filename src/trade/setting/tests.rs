@@ -4,12 +4,12 @@ use super::*;
 fn what_answers_a_project_can_be_asked_of_it() {
     let project = Project::around("a.stl", None);
     let mut settings = vec![
-        Setting::centre(&project),
-        Setting::fine(&project),
-        Setting::named(&project, Quality::Draft),
+        TradeSetting::centre(&project),
+        TradeSetting::fine(&project),
+        TradeSetting::named(&project, Quality::Draft),
     ];
     for k in 0..2 {
-        let around: Vec<Setting> = (Knob::ALL.iter())
+        let around: Vec<TradeSetting> = (Knob::ALL.iter())
             .flat_map(|&knob| settings[k].neighbours(knob))
             .collect();
         settings.extend(around);
@@ -33,8 +33,8 @@ fn what_answers_a_project_can_be_asked_of_it() {
 #[test]
 fn knobs_that_nothing_hears_stay_where_they_are() {
     let project = Project::around("a.stl", None);
-    let centre = Setting::centre(&project);
-    let offered = |s: &Setting| -> Vec<Knob> {
+    let centre = TradeSetting::centre(&project);
+    let offered = |s: &TradeSetting| -> Vec<Knob> {
         let turns = |knob: &Knob| !s.neighbours(*knob).is_empty();
         Knob::ALL.into_iter().filter(turns).collect()
     };
@@ -55,7 +55,7 @@ fn knobs_that_nothing_hears_stay_where_they_are() {
     let mut paper = project.clone();
     paper.evaluation.estimator = EstimatorKind::Svr;
     paper.selection.selector = SelectorKind::GreedySvr;
-    let trained = Setting::centre(&paper);
+    let trained = TradeSetting::centre(&paper);
     for knob in [
         Knob::Unexplained,
         Knob::SelectionTouches,
@@ -64,7 +64,7 @@ fn knobs_that_nothing_hears_stay_where_they_are() {
     ] {
         assert!(offered(&trained).contains(&knob), "{knob:?}");
         let turned = trained.neighbours(knob)[0];
-        let back = Setting {
+        let back = TradeSetting {
             selector: centre.selector,
             estimator: centre.estimator,
             ..turned
@@ -73,7 +73,7 @@ fn knobs_that_nothing_hears_stay_where_they_are() {
     }
     assert!(!centre.in_words().contains("folds") && trained.in_words().contains("folds"));
     // More places than there are touches are no other setting.
-    let few = Setting {
+    let few = TradeSetting {
         limits: centre.limits.map(|s| Spent { touches: 100, ..s }),
         ..centre
     }
@@ -85,7 +85,7 @@ fn knobs_that_nothing_hears_stay_where_they_are() {
 #[test]
 fn a_setting_is_judged_by_its_own_estimator() {
     let project = Project::around("a.stl", None);
-    let centre = Setting::centre(&project);
+    let centre = TradeSetting::centre(&project);
     assert_eq!(centre.estimator, EstimatorKind::Matching);
     for setting in [centre, centre.neighbours(Knob::Estimator)[0]] {
         let mut applied = project.clone();

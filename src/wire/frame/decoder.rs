@@ -1,6 +1,6 @@
 //! Frames found in bytes, in whatever pieces these come.
 
-use super::message::Message;
+use super::message::WireMessage;
 use super::refusal::Refusal;
 use super::{HEAD, LONGEST, SUM, TAIL, payload};
 
@@ -9,7 +9,7 @@ const BEGUN_ANEW: u32 = 16;
 
 /// What the decoder makes of bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Event {
+pub enum Decoded {
     /// A message, sound and of a known kind.
     Message {
         /// Number of its frame, modulo 65536.
@@ -17,7 +17,7 @@ pub enum Event {
         /// The board's clock; see [`crate::wire::Timeline`].
         time_us: u32,
         /// What it says.
-        message: Message,
+        message: WireMessage,
     },
     /// So many frames are missing before the next one.
     Lost(u16),
@@ -39,14 +39,14 @@ pub struct Decoder {
 
 impl Decoder {
     /// Takes in bytes and tells what they are. Whatever they are, no more than one frame is held.
-    pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(Event)) {
+    pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(Decoded)) {
         for &byte in bytes {
             if byte != 0 {
                 self.keep(byte);
                 continue;
             }
             if self.overlong {
-                tell(Event::Refused(Refusal::Framing));
+                tell(Decoded::Refused(Refusal::Framing));
             } else if !self.frame.is_empty() {
                 self.end_of_frame(&mut tell);
             }
@@ -80,25 +80,25 @@ impl Decoder {
         self.overlong = line.is_none();
     }
 
-    fn end_of_frame(&mut self, tell: &mut impl FnMut(Event)) {
+    fn end_of_frame(&mut self, tell: &mut impl FnMut(Decoded)) {
         match self.read_behind_text() {
             Ok((sequence, time_us, message)) => {
                 if let Some(refused) = self.follow(sequence, &message, tell) {
-                    return tell(Event::Refused(refused));
+                    return tell(Decoded::Refused(refused));
                 }
-                tell(Event::Message {
+                tell(Decoded::Message {
                     sequence,
                     time_us,
                     message,
                 });
             }
-            Err(refusal) => tell(Event::Refused(refusal)),
+            Err(refusal) => tell(Decoded::Refused(refusal)),
         }
     }
 
     /// What lies between two zeros. A board that has just printed lines sends no zero before its first frame, which
     /// then begins behind one of the line feeds.
-    fn read_behind_text(&mut self) -> Result<(u16, u32, Message), Refusal> {
+    fn read_behind_text(&mut self) -> Result<(u16, u32, WireMessage), Refusal> {
         let starts = starts_behind_lines(&self.frame);
         if starts.is_empty() {
             return self.read();
@@ -116,7 +116,7 @@ impl Decoder {
         found
     }
 
-    fn read(&mut self) -> Result<(u16, u32, Message), Refusal> {
+    fn read(&mut self) -> Result<(u16, u32, WireMessage), Refusal> {
         let length = cobs::decode_in_place(&mut self.frame).map_err(|_| Refusal::Framing)?;
         let frame = &self.frame[..length];
         let body = length.checked_sub(TAIL).filter(|&b| b >= HEAD);
@@ -139,10 +139,10 @@ impl Decoder {
     fn follow(
         &mut self,
         sequence: u16,
-        message: &Message,
-        tell: &mut impl FnMut(Event),
+        message: &WireMessage,
+        tell: &mut impl FnMut(Decoded),
     ) -> Option<Refusal> {
-        if let Message::Hello(hello) = message {
+        if let WireMessage::Hello(hello) = message {
             self.layout = Some((usize::from(hello.channels), hello.bits));
             // A board that has begun anew counts from where it likes.
             (self.last, self.late) = (Some(sequence), 0);
@@ -156,7 +156,7 @@ impl Decoder {
             return Some(Refusal::Repeated);
         }
         if gap > 0 && gap < 0x8000 {
-            tell(Event::Lost(gap));
+            tell(Decoded::Lost(gap));
         }
         (self.last, self.late) = (Some(sequence), 0);
         None
@@ -185,7 +185,7 @@ mod tests {
     use super::*;
     use crate::wire::encode;
 
-    fn events(bytes: &[u8]) -> Vec<Event> {
+    fn events(bytes: &[u8]) -> Vec<Decoded> {
         let mut decoder = Decoder::default();
         let mut all = Vec::new();
         decoder.push(bytes, |e| all.push(e));
@@ -194,8 +194,8 @@ mod tests {
 
     #[test]
     fn gaps_repeats_and_new_beginnings_are_told_apart() {
-        let hello = Message::Hello(board());
-        let data = Message::Data(vec![5; 12]);
+        let hello = WireMessage::Hello(board());
+        let data = WireMessage::Data(vec![5; 12]);
         let mut bytes = Vec::new();
         encode(&hello, 65_530, 0, 12, &mut bytes);
         for sequence in [65_531, 65_535, 0, 0, 65_531, 1] {
@@ -203,9 +203,9 @@ mod tests {
         }
         let met: Vec<String> = (events(&bytes).iter())
             .map(|event| match event {
-                Event::Message { sequence, .. } => sequence.to_string(),
-                Event::Lost(n) => format!("lost {n}"),
-                Event::Refused(why) => format!("{why:?}"),
+                Decoded::Message { sequence, .. } => sequence.to_string(),
+                Decoded::Lost(n) => format!("lost {n}"),
+                Decoded::Refused(why) => format!("{why:?}"),
             })
             .collect();
         let expected = [
@@ -218,28 +218,28 @@ mod tests {
         }
         let heard = events(&bytes)
             .into_iter()
-            .filter(|e| matches!(e, Event::Message { .. }));
+            .filter(|e| matches!(e, Decoded::Message { .. }));
         assert!(heard.count() > 25);
     }
 
     #[test]
     fn data_without_a_layout_are_refused_and_floods_are_not_kept() {
         let mut bytes = Vec::new();
-        encode(&Message::Data(vec![5; 12]), 0, 0, 12, &mut bytes);
-        assert_eq!(events(&bytes), [Event::Refused(Refusal::NoLayout)]);
+        encode(&WireMessage::Data(vec![5; 12]), 0, 0, 12, &mut bytes);
+        assert_eq!(events(&bytes), [Decoded::Refused(Refusal::NoLayout)]);
         let mut decoder = Decoder::default();
         decoder.push(&vec![0x41; 1_000_000], |e| panic!("{e:?}"));
         assert!(decoder.frame.capacity() < 1024);
         let mut met = Vec::new();
         decoder.push(&[0], |e| met.push(e));
-        assert_eq!(met, [Event::Refused(Refusal::Framing)]);
+        assert_eq!(met, [Decoded::Refused(Refusal::Framing)]);
     }
 
     /// A HELLO as its bytes on the wire, after something was done to its payload.
     fn hello_with(change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
         let mut frame = vec![HELLO, 0, 0, 0, 0, 0, 0];
         let mut said = Vec::new();
-        payload::append(&Message::Hello(board()), 12, &mut said);
+        payload::append(&WireMessage::Hello(board()), 12, &mut said);
         change(&mut said);
         frame.extend(said);
         frame.extend(SUM.checksum(&frame).to_le_bytes());
@@ -271,18 +271,18 @@ mod tests {
             (hello_with(|p| p.truncate(20)), Refusal::Unknown),
         ];
         let mut sound = Vec::new();
-        encode(&Message::Hello(board()), 0, 0, 12, &mut sound);
+        encode(&WireMessage::Hello(board()), 0, 0, 12, &mut sound);
         let mut data = Vec::new();
-        encode(&Message::Data(vec![5; 12]), 1, 0, 12, &mut data);
+        encode(&WireMessage::Data(vec![5; 12]), 1, 0, 12, &mut data);
         for (bytes, refusal) in cases {
             let all = [&sound[..], &bytes, &data].concat();
             let said = events(&all);
-            assert_eq!(said[1], Event::Refused(refusal));
-            let trusted = matches!(said[2], Event::Message { .. });
+            assert_eq!(said[1], Decoded::Refused(refusal));
+            let trusted = matches!(said[2], Decoded::Message { .. });
             assert_eq!(trusted, refusal == Refusal::Unknown, "{:?}", said[2]);
             assert_eq!(refusal.in_words().is_some(), refusal.is_lasting());
         }
-        let Event::Refused(why) = events(&hello_with(|p| p[10] = 25))[0] else {
+        let Decoded::Refused(why) = events(&hello_with(|p| p[10] = 25))[0] else {
             panic!("25 bits were believed");
         };
         let said = why.in_words().unwrap();
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn a_frame_behind_printed_lines_is_found() {
-        let hello = Message::Hello(board());
+        let hello = WireMessage::Hello(board());
         let texts = [
             "1,2,3\n",
             "ready\r\n\n",
@@ -307,7 +307,7 @@ mod tests {
             encode(&hello, 0, 0, 12, &mut bytes);
             let found = events(&bytes);
             let is_hello =
-                |e: &Event| matches!(e, Event::Message { message, .. } if *message == hello);
+                |e: &Decoded| matches!(e, Decoded::Message { message, .. } if *message == hello);
             assert!(found.len() == 1 && is_hello(&found[0]), "{text}: {found:?}");
         }
     }
@@ -315,13 +315,13 @@ mod tests {
     #[test]
     fn data_of_another_size_say_so() {
         let mut bytes = Vec::new();
-        encode(&Message::Hello(board()), 0, 0, 12, &mut bytes);
-        encode(&Message::Data(vec![5; 11]), 1, 0, 12, &mut bytes);
+        encode(&WireMessage::Hello(board()), 0, 0, 12, &mut bytes);
+        encode(&WireMessage::Data(vec![5; 11]), 1, 0, 12, &mut bytes);
         let refusal = Refusal::Size {
             found: 17,
             announced: 18,
         };
-        assert_eq!(events(&bytes)[1], Event::Refused(refusal));
+        assert_eq!(events(&bytes)[1], Decoded::Refused(refusal));
     }
 
     /// Bytes flipped, dropped, doubled: what comes through was sent, and sound frames come through.
@@ -332,25 +332,25 @@ mod tests {
         let counts = |k: u32| -> Vec<u32> { (0..12).map(|c| (k * 31 + c * 517) % 4096).collect() };
         let mut decoder = Decoder::default();
         let mut hello = Vec::new();
-        encode(&Message::Hello(board()), u16::MAX, 0, 12, &mut hello);
+        encode(&WireMessage::Hello(board()), u16::MAX, 0, 12, &mut hello);
         let (mut good, mut refused, mut lost) = (0_u32, 0_u32, 0_u32);
-        let mut tell = |event: Event| match event {
-            Event::Message {
+        let mut tell = |event: Decoded| match event {
+            Decoded::Message {
                 time_us,
-                message: Message::Data(found),
+                message: WireMessage::Data(found),
                 ..
             } => {
                 good += 1;
                 assert_eq!(found, counts(time_us), "frame {time_us}");
             }
-            Event::Message { .. } => {}
-            Event::Lost(n) => lost += u32::from(n),
-            Event::Refused(_) => refused += 1,
+            Decoded::Message { .. } => {}
+            Decoded::Lost(n) => lost += u32::from(n),
+            Decoded::Refused(_) => refused += 1,
         };
         decoder.push(&hello, &mut tell);
         for k in 0..FRAMES {
             let mut bytes = Vec::new();
-            encode(&Message::Data(counts(k)), k as u16, k, 12, &mut bytes);
+            encode(&WireMessage::Data(counts(k)), k as u16, k, 12, &mut bytes);
             let mut sent = Vec::new();
             for mut byte in bytes {
                 let fate: f64 = rng.random();

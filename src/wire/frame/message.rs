@@ -25,7 +25,7 @@ pub struct Hello {
 
 /// One thing said on the wire.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Message {
+pub enum WireMessage {
     // From the board.
     /// What the board is.
     Hello(Hello),

@@ -1,6 +1,6 @@
 //! What stands in a frame: a message as bytes, and bytes as a message.
 
-use super::message::{Hello, Message};
+use super::message::{Hello, WireMessage};
 use super::refusal::Refusal;
 use crate::wire::{MOST_CHANNELS, VERSION};
 
@@ -17,19 +17,19 @@ const RATE: u8 = 0x84;
 const PING: u8 = 0x85;
 
 /// The byte that tells what a message is.
-pub(super) fn kind(message: &Message) -> u8 {
+pub(super) fn kind(message: &WireMessage) -> u8 {
     match message {
-        Message::Hello(_) => HELLO,
-        Message::Data(_) => DATA,
-        Message::Status { .. } => STATUS,
-        Message::Log { .. } => LOG,
-        Message::Pong(_) => PONG,
-        Message::Note(_) => NOTE,
-        Message::AskHello => ASK_HELLO,
-        Message::Start => START,
-        Message::Stop => STOP,
-        Message::Rate(_) => RATE,
-        Message::Ping(_) => PING,
+        WireMessage::Hello(_) => HELLO,
+        WireMessage::Data(_) => DATA,
+        WireMessage::Status { .. } => STATUS,
+        WireMessage::Log { .. } => LOG,
+        WireMessage::Pong(_) => PONG,
+        WireMessage::Note(_) => NOTE,
+        WireMessage::AskHello => ASK_HELLO,
+        WireMessage::Start => START,
+        WireMessage::Stop => STOP,
+        WireMessage::Rate(_) => RATE,
+        WireMessage::Ping(_) => PING,
     }
 }
 
@@ -39,9 +39,9 @@ pub(super) fn is_known(kind: u8) -> bool {
 }
 
 /// Appends what follows the head of a message's frame.
-pub(super) fn append(message: &Message, bits: u8, out: &mut Vec<u8>) {
+pub(super) fn append(message: &WireMessage, bits: u8, out: &mut Vec<u8>) {
     match message {
-        Message::Hello(h) => {
+        WireMessage::Hello(h) => {
             out.extend(MAGIC);
             out.push(h.version);
             out.extend(h.board.to_le_bytes());
@@ -52,22 +52,22 @@ pub(super) fn append(message: &Message, bits: u8, out: &mut Vec<u8>) {
             out.extend(h.rate_hz.to_le_bytes());
             out.extend(h.name.bytes());
         }
-        Message::Data(counts) => pack(counts, bits, out),
-        Message::Status {
+        WireMessage::Data(counts) => pack(counts, bits, out),
+        WireMessage::Status {
             overruns,
             temperature_centi,
         } => {
             out.extend(overruns.to_le_bytes());
             out.extend(temperature_centi.unwrap_or(i16::MAX).to_le_bytes());
         }
-        Message::Log { level, text } => {
+        WireMessage::Log { level, text } => {
             out.push(*level);
             out.extend(text.bytes());
         }
-        Message::Note(text) => out.extend(text.bytes()),
-        Message::Pong(token) | Message::Ping(token) => out.extend(token.to_le_bytes()),
-        Message::Rate(hertz) => out.extend(hertz.to_le_bytes()),
-        Message::AskHello | Message::Start | Message::Stop => {}
+        WireMessage::Note(text) => out.extend(text.bytes()),
+        WireMessage::Pong(token) | WireMessage::Ping(token) => out.extend(token.to_le_bytes()),
+        WireMessage::Rate(hertz) => out.extend(hertz.to_le_bytes()),
+        WireMessage::AskHello | WireMessage::Start | WireMessage::Stop => {}
     }
 }
 
@@ -117,34 +117,34 @@ pub(super) fn read(
     kind: u8,
     payload: &[u8],
     layout: Option<(usize, u8)>,
-) -> Result<Message, Refusal> {
+) -> Result<WireMessage, Refusal> {
     let unknown = Err(Refusal::Unknown);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     Ok(match (kind, payload) {
-        (HELLO, _) => Message::Hello(hello(payload)?),
+        (HELLO, _) => WireMessage::Hello(hello(payload)?),
         (DATA, _) => {
             let (channels, bits) = layout.ok_or(Refusal::NoLayout)?;
             let (found, announced) = (payload.len(), packed(channels, bits));
             if found != announced {
                 return Err(Refusal::Size { found, announced });
             }
-            Message::Data(unpack(payload, channels, bits))
+            WireMessage::Data(unpack(payload, channels, bits))
         }
-        (STATUS, &[a, b, c, d, t, u]) => Message::Status {
+        (STATUS, &[a, b, c, d, t, u]) => WireMessage::Status {
             overruns: u32::from_le_bytes([a, b, c, d]),
             temperature_centi: Some(i16::from_le_bytes([t, u])).filter(|&t| t != i16::MAX),
         },
-        (LOG, [level, rest @ ..]) => Message::Log {
+        (LOG, [level, rest @ ..]) => WireMessage::Log {
             level: *level,
             text: text(rest),
         },
-        (NOTE, _) => Message::Note(text(payload)),
-        (PONG, &[a, b, c, d]) => Message::Pong(u32::from_le_bytes([a, b, c, d])),
-        (PING, &[a, b, c, d]) => Message::Ping(u32::from_le_bytes([a, b, c, d])),
-        (RATE, &[a, b]) => Message::Rate(u16::from_le_bytes([a, b])),
-        (ASK_HELLO, []) => Message::AskHello,
-        (START, []) => Message::Start,
-        (STOP, []) => Message::Stop,
+        (NOTE, _) => WireMessage::Note(text(payload)),
+        (PONG, &[a, b, c, d]) => WireMessage::Pong(u32::from_le_bytes([a, b, c, d])),
+        (PING, &[a, b, c, d]) => WireMessage::Ping(u32::from_le_bytes([a, b, c, d])),
+        (RATE, &[a, b]) => WireMessage::Rate(u16::from_le_bytes([a, b])),
+        (ASK_HELLO, []) => WireMessage::AskHello,
+        (START, []) => WireMessage::Start,
+        (STOP, []) => WireMessage::Stop,
         _ => return unknown,
     })
 }
@@ -204,7 +204,7 @@ pub(super) const MOST_BITS: usize = 24;
 
 pub(super) const MAGIC: [u8; 4] = *b"HAPD";
 
-impl Message {
+impl WireMessage {
     /// Whether a studio says it, and never a board.
     #[must_use]
     pub fn is_of_studio(&self) -> bool {

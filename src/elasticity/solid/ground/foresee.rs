@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::SolidGround;
-use super::foreseen::{Foreseen, Taken, is_quick};
+use super::foreseen::{Foreseen, ModelCost, is_quick};
 use super::graded::{Grids, ORDER, STRAIN_ORDER};
-use super::solved::{SAFETY, Solved};
+use super::solved::{SAFETY, SolvedModel};
 use crate::budget::{ElementBudget, Watch};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::{PLACES, sample, subsample};
@@ -17,16 +17,16 @@ use crate::elasticity::solid::sizing::{self, LEAST_GRIDS};
 use crate::memory;
 
 /// Cells of one size after the other.
-struct Look<'a> {
+struct ForeseenCells<'a> {
     ground: &'a SolidGround,
     touches: Vec<Touch>,
     places: Vec<DVec3>,
     grids: Grids,
-    taken: Vec<Taken>,
+    taken: Vec<ModelCost>,
     foreseen: Foreseen,
 }
 
-impl Look<'_> {
+impl ForeseenCells<'_> {
     /// Looks at cells of the next size (m): solves them where they are among the first or quick.
     fn go_on(&mut self, size: f64, watch: Watch) -> Result<(), ElasticError> {
         let taken = self.extrapolated(size);
@@ -47,7 +47,7 @@ impl Look<'_> {
     }
 
     /// What cells of a size (m) take, from two that were solved.
-    fn extrapolated(&self, size: f64) -> Option<Taken> {
+    fn extrapolated(&self, size: f64) -> Option<ModelCost> {
         let [.., before, last] = &self.taken[..] else {
             return None;
         };
@@ -64,7 +64,7 @@ impl Look<'_> {
         taken.is_none_or(|taken| taken.bytes <= memory::allowed())
     }
 
-    fn solve(&mut self, size: f64, watch: Watch) -> Result<Taken, ElasticError> {
+    fn solve(&mut self, size: f64, watch: Watch) -> Result<ModelCost, ElasticError> {
         /// The surface is found less closely: that takes most of the time, and what it leaves is the same on all grids.
         const LOOSELY: f64 = 2.0;
         // The factor before goes first: memory is asked for one of them.
@@ -76,9 +76,9 @@ impl Look<'_> {
             ..closely
         };
         let cells = ground.immersed.cells(&fineness, watch)?;
-        let taken = Taken::by(&cells, plan(&cells).ok().as_ref());
+        let taken = ModelCost::by(&cells, plan(&cells).ok().as_ref());
         let model = (ground.immersed).on_cells(&ground.whole, cells, &fineness, watch)?;
-        let solved = Solved::of(fineness, model, &self.touches, &self.places, watch)?;
+        let solved = SolvedModel::of(fineness, model, &self.touches, &self.places, watch)?;
         self.grids.push(solved);
         Ok(taken)
     }
@@ -105,7 +105,7 @@ impl SolidGround {
         let touches = sample(touches);
         let (tip, away) = self.nearest(&touches);
         let mut size = shape.first(tip, away, least);
-        let mut look = Look {
+        let mut look = ForeseenCells {
             ground: self,
             touches,
             places: subsample(places, PLACES),

@@ -3,8 +3,8 @@
 use crate::elasticity::estimate::{self, Discretization};
 use crate::elasticity::solid::Elements;
 use crate::elasticity::solid::orders::FIRST;
-use crate::elasticity::solid::tetrahedra::Tetrahedra;
-use crate::elasticity::solver::Plan;
+use crate::elasticity::solid::tetrahedra::OrderedTetrahedra;
+use crate::elasticity::solver::FactorPlan;
 
 /// What the elements of a part will be, and what they take.
 #[derive(Clone, Copy, Debug)]
@@ -48,14 +48,14 @@ impl Foreseen {
     }
 
     /// The next order of the part's own tetrahedra, which takes the place of the last.
-    pub(super) fn raise(&mut self, order: usize, elements: &Tetrahedra) {
+    pub(super) fn raise(&mut self, order: usize, elements: &OrderedTetrahedra) {
         self.order = order;
         self.before = self.bytes;
-        self.go_on(&Taken::by(elements, elements.plan()));
+        self.go_on(&ModelCost::by(elements, elements.plan()));
     }
 
     /// The next model, which takes the place of the last.
-    pub(super) fn go_on(&mut self, next: &Taken) {
+    pub(super) fn go_on(&mut self, next: &ModelCost) {
         self.unknowns = next.unknowns;
         self.entries = next.entries;
         self.bytes = next.bytes;
@@ -66,7 +66,7 @@ impl Foreseen {
 
 /// What one model takes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Taken {
+pub(super) struct ModelCost {
     pub unknowns: f64,
     pub entries: f64,
     pub bytes: f64,
@@ -74,9 +74,9 @@ pub(super) struct Taken {
     pub multiplications: f64,
 }
 
-impl Taken {
+impl ModelCost {
     /// By elements with this factor, where it is known.
-    pub fn by(elements: &dyn Elements, plan: Option<&Plan>) -> Self {
+    pub fn by(elements: &dyn Elements, plan: Option<&FactorPlan>) -> Self {
         let assembled = elements.entries();
         plan.map_or_else(Self::default, |plan| Self {
             unknowns: plan.unknowns,

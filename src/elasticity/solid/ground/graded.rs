@@ -3,14 +3,14 @@
 use glam::DVec3;
 
 use super::SolidGround;
-use super::solved::{SAFETY, SolidGraded, Solved};
+use super::solved::{SAFETY, SolidGraded, SolvedModel};
 use crate::budget::{ElementBudget, Watch};
 use crate::elasticity::error::ElasticError;
-use crate::elasticity::estimate::{self, Discretization, Sample};
+use crate::elasticity::estimate::{self, Discretization, ModelSample};
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::orders::FIRST;
-use crate::elasticity::solid::series::Series;
+use crate::elasticity::solid::series::GridSeries;
 use crate::elasticity::solid::sizing::{self, LEAST_GRIDS, PartMeasures};
 use crate::elasticity::solid::tip;
 
@@ -23,8 +23,8 @@ pub(super) const STRAIN_ORDER: f64 = 1.5;
 #[derive(Default)]
 pub(super) struct Grids {
     sizes: Vec<f64>,
-    samples: Vec<Sample>,
-    last: Option<Solved>,
+    samples: Vec<ModelSample>,
+    last: Option<SolvedModel>,
 }
 
 impl Grids {
@@ -33,7 +33,7 @@ impl Grids {
     fn go_on(
         &mut self,
         size: f64,
-        solve: impl Fn(f64) -> Result<Solved, ElasticError>,
+        solve: impl Fn(f64) -> Result<SolvedModel, ElasticError>,
     ) -> Result<bool, ElasticError> {
         // The factor before goes first: memory is asked for one of them.
         self.last = None;
@@ -66,7 +66,7 @@ impl Grids {
         self.sizes.last().copied().unwrap_or(f64::INFINITY)
     }
 
-    pub(super) fn push(&mut self, mut solved: Solved) {
+    pub(super) fn push(&mut self, mut solved: SolvedModel) {
         self.sizes.push(solved.fineness.size);
         self.samples.push(std::mem::take(&mut solved.sample));
         self.last = Some(solved);
@@ -139,8 +139,8 @@ impl SolidGround {
         let size = grids.sizes[grids.sizes.len() - 1];
         let wall = self.wall();
         let (of_displacements, of_strains) = (
-            Series::new(&grids.sizes, ORDER),
-            Series::new(&grids.sizes, STRAIN_ORDER),
+            GridSeries::new(&grids.sizes, ORDER),
+            GridSeries::new(&grids.sizes, STRAIN_ORDER),
         );
         let under: Vec<f64> = (0..touches.len())
             .map(|load| {
@@ -165,10 +165,10 @@ impl SolidGround {
         touches: &[Touch],
         places: &[DVec3],
         watch: Watch,
-    ) -> Result<Solved, ElasticError> {
+    ) -> Result<SolvedModel, ElasticError> {
         let fineness = self.fineness(size);
         let model = self.model(&fineness, watch)?;
-        Ok(Solved::of(fineness, model, touches, places, watch)?)
+        Ok(SolvedModel::of(fineness, model, touches, places, watch)?)
     }
 }
 

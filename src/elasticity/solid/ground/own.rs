@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::SolidGround;
 use super::foreseen::{Foreseen, is_quick};
-use super::solved::{SAFETY, SolidGraded, Solved};
+use super::solved::{SAFETY, SolidGraded, SolvedModel};
 use crate::budget::{ElementBudget, Watch};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization};
@@ -13,9 +13,9 @@ use crate::elasticity::load::Touch;
 use crate::elasticity::model::Model as _;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::solid::orders::{self, FIRST};
-use crate::elasticity::solid::piece::Piece;
+use crate::elasticity::solid::piece::TetrahedraPiece;
 use crate::elasticity::solid::simplex::{HIGHEST, Simplex};
-use crate::elasticity::solid::tetrahedra::Tetrahedra;
+use crate::elasticity::solid::tetrahedra::OrderedTetrahedra;
 use crate::memory;
 use crate::mesh::volume::VolumeMesh;
 
@@ -42,7 +42,7 @@ impl Climb {
         }
     }
 
-    fn step(&mut self, from: &Solved, to: &Solved) {
+    fn step(&mut self, from: &SolvedModel, to: &SolvedModel) {
         let (touches, places) = (&self.touches, &self.places);
         self.changes
             .push(change(&from.sample, &to.sample, touches, places));
@@ -68,8 +68,8 @@ impl Climb {
 
 /// What changes from one order to the next.
 fn change(
-    from: &estimate::Sample,
-    to: &estimate::Sample,
+    from: &estimate::ModelSample,
+    to: &estimate::ModelSample,
     touches: &[Touch],
     places: &[DVec3],
 ) -> Discretization {
@@ -93,7 +93,7 @@ fn left(changes: &[Discretization], before_last: bool) -> Discretization {
 
 impl SolidGround {
     /// The part's own tetrahedra at an order, up to [`HIGHEST`] and as far as memory holds who is whose neighbour.
-    pub(super) fn own_at(&self, order: usize) -> Option<(Fineness, Tetrahedra)> {
+    pub(super) fn own_at(&self, order: usize) -> Option<(Fineness, OrderedTetrahedra)> {
         let own = self.immersed.own()?;
         let each = Simplex::count(order).pow(2) * size_of::<u32>();
         let bytes = own.tetrahedra.len() as f64 * each as f64;
@@ -121,31 +121,31 @@ impl SolidGround {
         touches: usize,
         aim: &ElementBudget,
         beside: f64,
-    ) -> Option<(Fineness, Tetrahedra)> {
+    ) -> Option<(Fineness, OrderedTetrahedra)> {
         let own = self.own_at(order);
         own.filter(|own| affords(Some(own), touches, aim, beside))
     }
 
     fn solve_own(
         &self,
-        (fineness, elements): (Fineness, Tetrahedra),
+        (fineness, elements): (Fineness, OrderedTetrahedra),
         climb: &Climb,
         watch: Watch,
-    ) -> Result<Solved, ElasticError> {
+    ) -> Result<SolvedModel, ElasticError> {
         let model = self
             .immersed
             .on_own(&self.whole, elements, &fineness, watch)?;
         let (touches, places) = (&climb.touches, &climb.places);
-        Ok(Solved::of(fineness, model, touches, places, watch)?)
+        Ok(SolvedModel::of(fineness, model, touches, places, watch)?)
     }
 
     /// As [`Self::solve_own`]; nothing where memory does not hold it.
     fn try_own(
         &self,
-        own: Option<(Fineness, Tetrahedra)>,
+        own: Option<(Fineness, OrderedTetrahedra)>,
         climb: &Climb,
         watch: Watch,
-    ) -> Result<Option<Solved>, ElasticError> {
+    ) -> Result<Option<SolvedModel>, ElasticError> {
         let Some(own) = own else { return Ok(None) };
         match self.solve_own(own, climb, watch) {
             Err(error) if error.is_memory() => Ok(None),
@@ -157,7 +157,7 @@ impl SolidGround {
     /// effort spent; displacements are carried on from the last two. The second order is solved in any case: it judges the first.
     pub(super) fn raise(
         &self,
-        first: (Fineness, Tetrahedra),
+        first: (Fineness, OrderedTetrahedra),
         touches: &[Touch],
         places: &[DVec3],
         aim: &ElementBudget,
@@ -217,7 +217,7 @@ impl SolidGround {
     /// [`ElasticError`] for what cannot be computed.
     pub(super) fn foresee_raised(
         &self,
-        first: (Fineness, Tetrahedra),
+        first: (Fineness, OrderedTetrahedra),
         touches: &[Touch],
         places: &[DVec3],
         count: usize,
@@ -293,9 +293,9 @@ impl SolidGround {
         };
         let mut found = Vec::new();
         for touch in subsample(&climb.touches, PIECES) {
-            let piece = Piece::around(own, touch.position);
+            let piece = TetrahedraPiece::around(own, touch.position);
             let near: Vec<DVec3> = piece.within(&climb.places);
-            let solved = |order| -> Result<Solved, ElasticError> {
+            let solved = |order| -> Result<SolvedModel, ElasticError> {
                 let fineness = Fineness {
                     order,
                     ..self.fineness(own.mean_edge())
@@ -303,7 +303,7 @@ impl SolidGround {
                 let model = self
                     .immersed
                     .on_piece(&self.whole, &piece, &fineness, watch)?;
-                Ok(Solved::of(fineness, model, &[touch], &near, watch)?)
+                Ok(SolvedModel::of(fineness, model, &[touch], &near, watch)?)
             };
             match (solved(FIRST), solved(FIRST + 1)) {
                 (Ok(from), Ok(to)) => {
@@ -323,7 +323,7 @@ impl SolidGround {
 
 /// Whether a factor fits into memory, of which so much is taken (bytes), and its solutions into the effort.
 fn affords(
-    own: Option<&(Fineness, Tetrahedra)>,
+    own: Option<&(Fineness, OrderedTetrahedra)>,
     touches: usize,
     aim: &ElementBudget,
     taken: f64,

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::budget::{Cancelled, Watch};
-use crate::elasticity::estimate::{Discretization, Sample};
+use crate::elasticity::estimate::{Discretization, ModelSample};
 use crate::elasticity::grade::{CHECKED, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::model::{LoadCheck, Model as _};
@@ -33,13 +33,13 @@ pub struct SolidGraded {
 pub(super) const SAFETY: f64 = 0.8;
 
 /// A model with the sample loads solved on it.
-pub(super) struct Solved {
+pub(super) struct SolvedModel {
     pub(super) fineness: Fineness,
     pub(super) model: SolidModel,
-    pub(super) sample: Sample,
+    pub(super) sample: ModelSample,
 }
 
-impl Solved {
+impl SolvedModel {
     pub(super) fn of(
         fineness: Fineness,
         model: SolidModel,
@@ -48,7 +48,7 @@ impl Solved {
         watch: Watch,
     ) -> Result<Self, Cancelled> {
         Ok(Self {
-            sample: Sample::read(&model, touches, places, watch)?,
+            sample: ModelSample::read(&model, touches, places, watch)?,
             fineness,
             model,
         })

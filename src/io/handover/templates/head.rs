@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::io::handover::marks::INK;
-use crate::paper::{Align, Line, Sheet};
+use crate::paper::{Align, Sheet, SheetLine};
 
 /// Around what is drawn (mm).
 pub(super) const MARGIN: f64 = 14.0;
@@ -17,14 +17,14 @@ pub(super) fn head(sheet: &mut Sheet, title: &str, words: &str) {
     let (y, from) = (23.0, MARGIN);
     sheet.line(
         [DVec2::new(from, y), DVec2::new(from + 100.0, y)],
-        Line::new(INK, 0.25),
+        SheetLine::new(INK, 0.25),
     );
     for k in 0..=10 {
         let x = from + 10.0 * f64::from(k);
         let tall = if k % 5 == 0 { 2.4 } else { 1.4 };
         sheet.line(
             [DVec2::new(x, y - tall), DVec2::new(x, y)],
-            Line::new(INK, 0.2),
+            SheetLine::new(INK, 0.2),
         );
     }
     let at = DVec2::new(from + 103.0, y);

@@ -6,11 +6,11 @@ use glam::DVec2;
 
 use super::head::{HEAD, MARGIN, head};
 use crate::io::handover::marks::{BLUE, INK, gauge};
-use crate::io::handover::source::Source;
+use crate::io::handover::source::HandoverSource;
 use crate::io::svg::from_behind;
 use crate::mesh::flatten::Flat;
 use crate::mesh::stretch::KEPT;
-use crate::paper::{Line, Sheet};
+use crate::paper::{Sheet, SheetLine};
 
 /// What neighbouring sheets have in common (mm).
 const OVERLAP: f64 = 10.0;
@@ -22,7 +22,7 @@ const TRUSTED: f64 = 0.02;
 const MOST: usize = 40;
 
 /// The inside in the plane (mm), as seen from inside: what is to the right outside is to the left.
-struct Plan {
+struct FlatInside {
     positions: Vec<DVec2>,
     triangles: Vec<[u32; 3]>,
     /// Whether lengths on each of them are off.
@@ -34,8 +34,8 @@ struct Plan {
     upper: DVec2,
 }
 
-impl Plan {
-    fn of(source: &Source<'_>) -> (Self, String) {
+impl FlatInside {
+    fn of(source: &HandoverSource<'_>) -> (Self, String) {
         let inner = &source.inner;
         let flat = Flat::of(&inner.mesh, inner.stance);
         let seen = |p: DVec2| DVec2::new(-p.x, p.y) * 1e3;
@@ -100,8 +100,8 @@ fn rims(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
 }
 
 /// The sheets, rows from above; none where there would be more than anybody glues together.
-pub(super) fn sheets(source: &Source<'_>) -> Vec<Sheet> {
-    let (plan, stretch) = Plan::of(source);
+pub(super) fn sheets(source: &HandoverSource<'_>) -> Vec<Sheet> {
+    let (plan, stretch) = FlatInside::of(source);
     let whole = plan.upper - plan.lower;
     let sheet = [Sheet::new(source.format), Sheet::lying(source.format)]
         .into_iter()
@@ -201,7 +201,7 @@ impl Window {
     }
 }
 
-fn draw(sheet: &mut Sheet, plan: &Plan, window: &Window, source: &Source<'_>) {
+fn draw(sheet: &mut Sheet, plan: &FlatInside, window: &Window, source: &HandoverSource<'_>) {
     for (tri, stretched) in plan.triangles.iter().zip(&plan.stretched) {
         let grey = if *stretched {
             [0xdd, 0xd9, 0xd0]
@@ -210,13 +210,13 @@ fn draw(sheet: &mut Sheet, plan: &Plan, window: &Window, source: &Source<'_>) {
         };
         let shape = window.clipped(&tri.map(|v| plan.positions[v as usize]));
         if shape.len() > 2 {
-            sheet.shape(shape, Some(grey), Some(Line::new(grey, 0.05)));
+            sheet.shape(shape, Some(grey), Some(SheetLine::new(grey, 0.05)));
         }
     }
     for rim in &plan.rims {
         let shape = window.clipped(&rim.map(|v| plan.positions[v as usize]));
         if shape.len() >= 2 {
-            sheet.line(shape.into_iter().take(2), Line::new(BLUE, 0.3));
+            sheet.line(shape.into_iter().take(2), SheetLine::new(BLUE, 0.3));
         }
     }
     let keys = &source.inputs.project.gauge;
@@ -265,9 +265,9 @@ fn crosses(
         for y in &ys {
             let at = DVec2::new(MARGIN + x, HEAD + y);
             for way in [DVec2::X, DVec2::Y] {
-                sheet.line([at - way * 3.0, at + way * 3.0], Line::new(INK, 0.15));
+                sheet.line([at - way * 3.0, at + way * 3.0], SheetLine::new(INK, 0.15));
             }
-            sheet.circle(at, 1.5, None, Some(Line::new(INK, 0.15)));
+            sheet.circle(at, 1.5, None, Some(SheetLine::new(INK, 0.15)));
         }
     }
 }

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use super::command::{DeckCommand, Lines};
-use super::elements::{Element, Routine};
-use super::format::Format;
-use super::reader::Reader;
-use crate::io::mesh_file::place::{Origin, Place};
-use crate::io::mesh_file::sets::Range;
+use super::command::{DeckCommand, DeckLines};
+use super::elements::{DeckElement, Routine};
+use super::format::FieldWidths;
+use super::reader::DeckReader;
+use crate::io::mesh_file::place::{ElementName, FilePlace};
+use crate::io::mesh_file::sets::NumberRange;
 use crate::io::mesh_file::tetrahedra::bounded;
 use crate::io::mesh_file::words::{at, fortran};
 
@@ -16,13 +16,13 @@ const MOST_NODES: i64 = 64;
 
 /// How a block was read.
 #[derive(Default)]
-struct Tally {
+struct BlockTally {
     read: u64,
     /// Whether its end stands there.
     ended: bool,
 }
 
-impl Tally {
+impl BlockTally {
     /// Refuses a block that was cut; `announced` is how many things it says that it has.
     fn check(
         &self,
@@ -53,12 +53,12 @@ impl Tally {
 }
 
 /// The format that follows a command.
-fn format_of(command: &DeckCommand, lines: &mut Lines) -> Result<Format, String> {
+fn format_of(command: &DeckCommand, lines: &mut DeckLines) -> Result<FieldWidths, String> {
     let (line, text) = lines.next().ok_or_else(|| {
         let what = format!("the file was cut after {}", command.title());
         at(command.line, &what)
     })?;
-    Format::of(text, line)
+    FieldWidths::of(text, line)
 }
 
 /// The deck's number of a node or an element.
@@ -72,12 +72,12 @@ fn numbers(fields: &[i64], line: usize) -> Result<Vec<u64>, String> {
     fields.iter().map(|&field| number(field, line)).collect()
 }
 
-impl Reader {
+impl DeckReader {
     /// NBLOCK,NUMFIELD,Solkey,NDMAX,NDSEL: number, …, three coordinates, and angles.
     pub(super) fn node_block(
         &mut self,
         command: &DeckCommand,
-        lines: &mut Lines,
+        lines: &mut DeckLines,
     ) -> Result<(), String> {
         let format = format_of(command, lines)?;
         if format.real_fields() < 3 {
@@ -85,8 +85,8 @@ impl Reader {
             return Err(at(command.line + 1, what));
         }
         let announced = self.known.whole(command, 3)?;
-        bounded(announced.unwrap_or(0), Place::Line(command.line))?;
-        let mut tally = Tally::default();
+        bounded(announced.unwrap_or(0), FilePlace::Line(command.line))?;
+        let mut tally = BlockTally::default();
         while let Some((line, text)) = lines.next_of_block() {
             let (whole, mut real) = format.numbers(text, line)?;
             let Some(&first) = whole.first() else {
@@ -129,12 +129,12 @@ impl Reader {
     pub(super) fn element_block(
         &mut self,
         command: &DeckCommand,
-        lines: &mut Lines,
+        lines: &mut DeckLines,
     ) -> Result<(), String> {
         let format = format_of(command, lines)?;
         let solid = command.label(1).starts_with("SOL");
         let announced = self.known.whole(command, 3)?;
-        let mut tally = Tally::default();
+        let mut tally = BlockTally::default();
         while let Some((line, text)) = lines.next_of_block() {
             let (fields, _) = format.numbers(text, line)?;
             if fields.is_empty() {
@@ -156,7 +156,7 @@ impl Reader {
     }
 
     /// An element of the active type: number, section, real constants, material, system, nodes.
-    fn short_element(&self, fields: &[i64], line: usize) -> Result<Element, String> {
+    fn short_element(&self, fields: &[i64], line: usize) -> Result<DeckElement, String> {
         let [tag, section, _, material, _, nodes @ ..] = fields else {
             return Err(cut_off(line, 0));
         };
@@ -164,8 +164,8 @@ impl Reader {
         while nodes.last() == Some(&0) {
             nodes.pop();
         }
-        Ok(Element {
-            origin: Origin::in_line(number(*tag, line)?, line),
+        Ok(DeckElement {
+            origin: ElementName::in_line(number(*tag, line)?, line),
             line,
             kind: self.active.kind,
             material: number(*material, line)?,
@@ -175,7 +175,7 @@ impl Reader {
     }
 
     /// ETBLOCK: number and routine of each type of elements.
-    pub(super) fn element_types(&mut self, lines: &mut Lines) -> Result<(), String> {
+    pub(super) fn element_types(&mut self, lines: &mut DeckLines) -> Result<(), String> {
         // Its format has words too.
         lines.next();
         while let Some((line, text)) = lines.next_of_block() {
@@ -196,7 +196,7 @@ impl Reader {
     pub(super) fn component_block(
         &mut self,
         command: &DeckCommand,
-        lines: &mut Lines,
+        lines: &mut DeckLines,
     ) -> Result<(), String> {
         let count = self.known.whole(command, 2)?.unwrap_or(0);
         let format = format_of(command, lines)?;
@@ -231,7 +231,7 @@ impl Reader {
             if item >= 0 {
                 set.numbers.push(last);
             } else if first <= last {
-                set.ranges.push(Range {
+                set.ranges.push(NumberRange {
                     first,
                     last,
                     step: 1,
@@ -246,7 +246,7 @@ impl Reader {
     pub(super) fn layers(
         &mut self,
         command: &DeckCommand,
-        lines: &mut Lines,
+        lines: &mut DeckLines,
     ) -> Result<(), String> {
         let count = self.known.whole(command, 0)?.unwrap_or(0);
         for _ in 0..count {
@@ -270,9 +270,9 @@ impl Reader {
 fn whole_element(
     fields: &[i64],
     line: usize,
-    format: &Format,
-    lines: &mut Lines,
-) -> Result<Element, String> {
+    format: &FieldWidths,
+    lines: &mut DeckLines,
+) -> Result<DeckElement, String> {
     let [
         material,
         kind,
@@ -313,8 +313,8 @@ fn whole_element(
         }
     }
     nodes.truncate(count);
-    Ok(Element {
-        origin: Origin::in_line(number(*tag, line)?, line),
+    Ok(DeckElement {
+        origin: ElementName::in_line(number(*tag, line)?, line),
         line,
         kind: number(*kind, line)?,
         material: number(*material, line)?,

@@ -116,9 +116,9 @@ fn command(text: &str, line: usize) -> Option<Statement<'_>> {
 }
 
 /// The lines of a file, with their numbers.
-pub struct Lines<'t>(Peekable<std::iter::Zip<std::ops::RangeFrom<usize>, std::str::Lines<'t>>>);
+pub struct DeckLines<'t>(Peekable<std::iter::Zip<std::ops::RangeFrom<usize>, std::str::Lines<'t>>>);
 
-impl<'t> Lines<'t> {
+impl<'t> DeckLines<'t> {
     #[must_use]
     pub fn of(text: &'t str) -> Self {
         Self((1..).zip(text.lines()).peekable())
@@ -139,7 +139,7 @@ impl<'t> Lines<'t> {
     }
 }
 
-impl<'t> Iterator for Lines<'t> {
+impl<'t> Iterator for DeckLines<'t> {
     type Item = (usize, &'t str);
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::io::mesh_file::place::Origin;
+use crate::io::mesh_file::place::ElementName;
 use crate::mesh::volume::Tetrahedron;
 
 /// What is made of an element.
@@ -52,8 +52,8 @@ impl Routine {
 }
 
 /// An element as the deck has it.
-pub struct Element {
-    pub origin: Origin,
+pub struct DeckElement {
+    pub origin: ElementName,
     /// Line that it begins in.
     pub line: usize,
     /// Numbers of its type, material and section.
@@ -69,7 +69,7 @@ const OF_TEN: [usize; 6] = [4, 5, 6, 7, 8, 9];
 /// The same in a brick of twenty whose corners are one at K and L, and at M, N, O and P.
 const OF_TWENTY: [usize; 6] = [8, 9, 11, 16, 17, 18];
 
-impl Element {
+impl DeckElement {
     /// The tetrahedron that it is; `places` are the nodes by the deck's numbers.
     ///
     /// # Errors
@@ -163,9 +163,9 @@ impl Element {
 mod tests {
     use super::*;
 
-    fn element(nodes: &[u64]) -> Element {
-        Element {
-            origin: Origin::in_line(29, 12),
+    fn element(nodes: &[u64]) -> DeckElement {
+        DeckElement {
+            origin: ElementName::in_line(29, 12),
             line: 12,
             kind: 1,
             material: 1,

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::elements::{Element, Use};
-use super::reader::Reader;
+use super::elements::{DeckElement, Use};
+use super::reader::DeckReader;
 use crate::io::mesh_file::sets::{Numbered, check_count};
 use crate::io::mesh_file::soup::Soup;
-use crate::io::mesh_file::tetrahedra::Tetrahedra;
+use crate::io::mesh_file::tetrahedra::FileTetrahedra;
 use crate::io::mesh_file::unread::Unread;
 use crate::io::mesh_file::words::at;
 use crate::plain;
@@ -14,15 +14,15 @@ use crate::plain;
 /// Elements by what is made of them.
 #[derive(Default)]
 struct Sorted<'e> {
-    tetrahedra: Tetrahedra,
-    solids: Vec<&'e Element>,
-    shells: Vec<&'e Element>,
+    tetrahedra: FileTetrahedra,
+    solids: Vec<&'e DeckElement>,
+    shells: Vec<&'e DeckElement>,
     left_out: Unread,
 }
 
 impl Sorted<'_> {
     /// Those that are computed on.
-    fn computed(&self) -> &[&Element] {
+    fn computed(&self) -> &[&DeckElement] {
         if self.solids.is_empty() {
             &self.shells
         } else {
@@ -31,7 +31,7 @@ impl Sorted<'_> {
     }
 }
 
-impl Reader {
+impl DeckReader {
     /// The mesh and what is said of it.
     ///
     /// # Errors
@@ -66,7 +66,7 @@ impl Reader {
         Ok(self.soup)
     }
 
-    fn sorted<'e>(&mut self, elements: &'e [Element]) -> Result<Sorted<'e>, String> {
+    fn sorted<'e>(&mut self, elements: &'e [DeckElement]) -> Result<Sorted<'e>, String> {
         let mut sorted = Sorted::default();
         for element in elements {
             let routine = self.routines.get(&element.kind).ok_or_else(|| {
@@ -111,7 +111,7 @@ impl Reader {
     }
 
     /// Looks up what components name.
-    fn take_sets(&mut self, elements: &[Element]) -> Result<(), String> {
+    fn take_sets(&mut self, elements: &[DeckElement]) -> Result<(), String> {
         let sets = self.node_sets.len() + self.element_sets.len();
         check_count(sets, self.nodes.len())?;
         let nodes = self.node_list().numbered;
@@ -157,7 +157,7 @@ impl Reader {
                 "the file has no thickness that is read (SECDATA of section {section}): the project's is taken"
             ));
         }
-        let curved = |element: &&&Element| element.nodes.len() > 4;
+        let curved = |element: &&&DeckElement| element.nodes.len() > 4;
         let curved = sorted.shells.iter().filter(curved).count();
         if curved > 0 {
             notes.push(format!(
@@ -193,8 +193,8 @@ impl Reader {
 
 /// The number that most elements have; more than one is noted.
 fn most(
-    elements: &[&Element],
-    number: impl Fn(&Element) -> u64,
+    elements: &[&DeckElement],
+    number: impl Fn(&DeckElement) -> u64,
     what: &str,
     notes: &mut Vec<String>,
 ) -> u64 {

@@ -8,12 +8,12 @@ const MOST: usize = 200;
 
 /// The widths of the fields of a line: whole numbers first.
 #[derive(Debug, PartialEq)]
-pub struct Format {
+pub struct FieldWidths {
     whole: Vec<usize>,
     real: Vec<usize>,
 }
 
-impl Format {
+impl FieldWidths {
     /// Of the line that says it.
     ///
     /// # Errors
@@ -115,11 +115,11 @@ mod tests {
 
     #[test]
     fn formats_of_ansys_are_read() {
-        let nodes = Format::of("(1i9,3e20.9e3)", 1).unwrap();
+        let nodes = FieldWidths::of("(1i9,3e20.9e3)", 1).unwrap();
         assert_eq!(nodes.whole, [9]);
         assert_eq!(nodes.real, [20; 3]);
-        assert_eq!(Format::of(" (19i9)", 1).unwrap().whole, [9; 19]);
-        assert_eq!(Format::of("(i10)", 1).unwrap().whole, [10]);
+        assert_eq!(FieldWidths::of(" (19i9)", 1).unwrap().whole, [9; 19]);
+        assert_eq!(FieldWidths::of("(i10)", 1).unwrap().whole, [10]);
         for bad in [
             "",
             "()",
@@ -131,14 +131,14 @@ mod tests {
             "(i9,a8)",
             "N,1,0,0",
         ] {
-            let said = Format::of(bad, 7).unwrap_err();
+            let said = FieldWidths::of(bad, 7).unwrap_err();
             assert!(said.starts_with("line 7"), "{said}");
         }
     }
 
     #[test]
     fn blanks_are_zero_and_missing_ends_are_missing() {
-        let format = Format::of("(2i4,2e8.2)", 1).unwrap();
+        let format = FieldWidths::of("(2i4,2e8.2)", 1).unwrap();
         let numbers = |text: &str| format.numbers(text, 5);
         assert_eq!(
             numbers("   1  -2    1.50 1.0D+01"),

@@ -11,7 +11,7 @@ const POISSONS_RATIO: f64 = 0.3;
 const SLOTS: usize = 1000;
 
 /// A temperature, where one is known, and the value there.
-type Entry = (Option<f64>, f64);
+type TemperatureValue = (Option<f64>, f64);
 
 /// Materials by number.
 #[derive(Default)]
@@ -19,7 +19,7 @@ pub struct Materials {
     /// The table of temperatures that values are given for next.
     temperatures: Vec<Option<f64>>,
     /// By number and label: EX and the like.
-    values: BTreeMap<(u64, String), Vec<Entry>>,
+    values: BTreeMap<(u64, String), Vec<TemperatureValue>>,
     /// The temperature of the part.
     reference: f64,
 }

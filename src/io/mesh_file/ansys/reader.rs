@@ -6,11 +6,11 @@ use std::rc::Rc;
 use glam::DVec3;
 
 use super::command::Parameters;
-use super::elements::{Element, Routine};
+use super::elements::{DeckElement, Routine};
 use super::material::Materials;
-use super::selection::Selection;
-use crate::io::mesh_file::held::Held;
-use crate::io::mesh_file::place::{Origin, Place};
+use super::selection::DeckSelection;
+use crate::io::mesh_file::held::HeldNodes;
+use crate::io::mesh_file::place::{ElementName, FilePlace};
 use crate::io::mesh_file::sets::{Numbered, Sets};
 use crate::io::mesh_file::soup::Soup;
 use crate::io::mesh_file::tetrahedra::bounded;
@@ -18,7 +18,7 @@ use crate::io::mesh_file::unread::Unread;
 use crate::io::mesh_file::words::at;
 
 #[derive(Default)]
-pub(super) struct Reader {
+pub(super) struct DeckReader {
     pub(super) soup: Soup,
     pub(super) known: Parameters,
     /// Places in our lists by the deck's numbers.
@@ -32,7 +32,7 @@ pub(super) struct Reader {
     pub(super) numbered: Option<(usize, Rc<Numbered>)>,
     /// Nodes with directions of their own.
     pub(super) turned: HashSet<u32>,
-    pub(super) elements: Vec<Element>,
+    pub(super) elements: Vec<DeckElement>,
     pub(super) routines: HashMap<u64, Routine>,
     /// What elements without attributes of their own get: type, material, section.
     pub(super) active: Active,
@@ -42,8 +42,8 @@ pub(super) struct Reader {
     pub(super) section: u64,
     pub(super) node_sets: Sets,
     pub(super) element_sets: Sets,
-    pub(super) selection: Selection,
-    pub(super) held: Held,
+    pub(super) selection: DeckSelection,
+    pub(super) held: HeldNodes,
     pub(super) unread: Unread,
     /// Line of the command that made a system of coordinates active that is not the global one.
     pub(super) elsewhere: Option<usize>,
@@ -76,7 +76,7 @@ impl Default for Active {
     }
 }
 
-impl Reader {
+impl DeckReader {
     pub(super) fn take_node(
         &mut self,
         number: u64,
@@ -85,7 +85,7 @@ impl Reader {
         line: usize,
     ) -> Result<(), String> {
         let place = self.soup.positions.len() as u32;
-        bounded(u64::from(place) + 1, Place::Line(line))?;
+        bounded(u64::from(place) + 1, FilePlace::Line(line))?;
         if number == 0 || self.nodes.insert(number, place).is_some() {
             let what = format!("node {number} is there a second time, or has no number");
             return Err(at(line, &what));
@@ -99,9 +99,9 @@ impl Reader {
         Ok(())
     }
 
-    pub(super) fn take_element(&mut self, element: Element) -> Result<(), String> {
+    pub(super) fn take_element(&mut self, element: DeckElement) -> Result<(), String> {
         let place = self.elements.len() as u32;
-        let Origin { number, .. } = element.origin;
+        let ElementName { number, .. } = element.origin;
         if let Some(first) = self.element_places.insert(number, place) {
             let first = self.elements[first as usize].line;
             let what = format!("element {number} is there a second time (first in line {first})");

@@ -10,7 +10,7 @@ use crate::io::mesh_file::sets::Numbered;
 
 /// What is selected.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum Selection {
+pub enum DeckSelection {
     #[default]
     All,
     Only(BTreeSet<u32>),
@@ -18,7 +18,7 @@ pub enum Selection {
     Unknown(usize),
 }
 
-impl Selection {
+impl DeckSelection {
     /// The places of what is selected among so many nodes; the line of what could not be followed.
     ///
     /// # Errors
@@ -122,14 +122,14 @@ mod tests {
 
     #[test]
     fn selections_are_changed_step_by_step() {
-        let mut selection = Selection::default();
+        let mut selection = DeckSelection::default();
         assert_eq!(selection.places(3), Ok(vec![0, 1, 2]));
         selection.change("S", Some(set(&[1, 2])), 9, 1);
         selection.change("A", Some(set(&[5])), 9, 2);
         selection.change("U", Some(set(&[1])), 9, 3);
         assert_eq!(selection.places(9), Ok(vec![2, 5]));
         selection.change("R", Some(set(&[5, 7])), 9, 4);
-        assert_eq!(selection, Selection::Only(set(&[5])));
+        assert_eq!(selection, DeckSelection::Only(set(&[5])));
         selection.change("A", None, 9, 5);
         selection.change("A", Some(set(&[5])), 9, 6);
         assert_eq!(selection.places(9), Err(5));

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::keyword::{Keyword, values};
 use crate::elasticity::DofSet;
-use crate::io::mesh_file::held::{Held, NodeSet};
+use crate::io::mesh_file::held::{HeldNodes, NodeSet};
 use crate::io::mesh_file::words::{fortran, listed, whole};
 use crate::plain;
 use crate::project::SupportKeys;
@@ -123,7 +123,7 @@ impl Boundaries {
         sets: &mut Vec<NodeSet>,
         notes: &mut Vec<String>,
     ) -> Vec<SupportKeys> {
-        let mut all = Held::default();
+        let mut all = HeldNodes::default();
         let mut unknown: Vec<&str> = Vec::new();
         for (name, dofs) in &self.held {
             let nodes = nodes_of(name, places, sets);

@@ -1,7 +1,7 @@
 //! The sections of a binary Gmsh file of version 4.1: byte after byte, without lines.
 
 use super::stream::Stream;
-use crate::io::mesh_file::place::Place;
+use crate::io::mesh_file::place::FilePlace;
 use crate::plain::quote;
 
 /// How a binary file writes its numbers.
@@ -13,14 +13,14 @@ pub enum Order {
 
 /// A section: its name, and what stands between its first and its last line.
 #[derive(Clone, Copy)]
-pub struct Piece<'t> {
+pub struct BinarySection<'t> {
     pub name: &'t str,
     /// Byte of the file that it begins at.
     pub begins: usize,
     pub bytes: &'t [u8],
 }
 
-impl Piece<'_> {
+impl BinarySection<'_> {
     /// The order of bytes, by the number one that stands in `$MeshFormat`.
     ///
     /// # Errors
@@ -43,7 +43,7 @@ impl Piece<'_> {
 ///
 /// # Errors
 /// A message naming the byte of what is no section, or is not ended.
-pub fn pieces(bytes: &[u8]) -> Result<Vec<Piece<'_>>, String> {
+pub fn pieces(bytes: &[u8]) -> Result<Vec<BinarySection<'_>>, String> {
     let mut pieces = Vec::new();
     let mut at = 0;
     while let Some(skipped) = bytes[at..].iter().position(|b| !b.is_ascii_whitespace()) {
@@ -66,7 +66,7 @@ pub fn pieces(bytes: &[u8]) -> Result<Vec<Piece<'_>>, String> {
                     quote(&format!("${name}"))
                 )
             })?;
-        pieces.push(Piece {
+        pieces.push(BinarySection {
             name,
             begins,
             bytes: &bytes[begins..begins + length],
@@ -78,7 +78,7 @@ pub fn pieces(bytes: &[u8]) -> Result<Vec<Piece<'_>>, String> {
 
 /// The numbers of a section.
 pub struct Bytes<'t> {
-    piece: Piece<'t>,
+    piece: BinarySection<'t>,
     order: Order,
     /// Bytes of it that were read, and those before the record that is read.
     read: usize,
@@ -87,7 +87,7 @@ pub struct Bytes<'t> {
 
 impl<'t> Bytes<'t> {
     #[must_use]
-    pub fn of(piece: Piece<'t>, order: Order) -> Self {
+    pub fn of(piece: BinarySection<'t>, order: Order) -> Self {
         Self {
             piece,
             order,
@@ -119,12 +119,12 @@ impl<'t> Bytes<'t> {
 }
 
 impl Stream for Bytes<'_> {
-    fn head(&self) -> Place {
-        Place::Byte(self.piece.begins)
+    fn head(&self) -> FilePlace {
+        FilePlace::Byte(self.piece.begins)
     }
 
-    fn place(&self) -> Place {
-        Place::Byte(self.piece.begins + self.record)
+    fn place(&self) -> FilePlace {
+        FilePlace::Byte(self.piece.begins + self.record)
     }
 
     fn name(&self) -> &str {
@@ -200,7 +200,7 @@ mod tests {
         let little = [7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
         let big = [0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 1];
         for (bytes, order) in [(little, Order::Little), (big, Order::Big)] {
-            let piece = Piece {
+            let piece = BinarySection {
                 name: "Nodes",
                 begins: 10,
                 bytes: &bytes,

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::section::Record;
+use super::section::RecordWords;
 use super::stream::Stream;
 use crate::io::mesh_file::held::NodeSet;
 
@@ -13,21 +13,21 @@ type Group = (u64, u64);
 const KINDS: [&str; 4] = ["point", "curve", "surface", "volume"];
 
 #[derive(Default)]
-pub struct Groups {
+pub struct PhysicalGroups {
     names: BTreeMap<Group, String>,
     /// Groups of each entity, by its dimension and number.
     of_entities: HashMap<(u64, i64), Vec<u64>>,
     nodes: BTreeMap<Group, Vec<u32>>,
 }
 
-impl Groups {
+impl PhysicalGroups {
     /// Takes in `$PhysicalNames`, which are text in every file.
     ///
     /// # Errors
     /// A message naming the line.
     pub fn read_names<'t>(
         &mut self,
-        mut records: impl Iterator<Item = Record<'t>>,
+        mut records: impl Iterator<Item = RecordWords<'t>>,
     ) -> Result<(), String> {
         let Some(mut head) = records.next() else {
             return Ok(());

@@ -8,7 +8,7 @@ use crate::io::mesh_file::words::{number, signed, whole};
 use crate::plain::quote;
 
 /// The lines between `$Name` and `$EndName`.
-pub struct Section<'t> {
+pub struct MshSection<'t> {
     pub name: &'t str,
     /// Number of the line `$Name`.
     begins: usize,
@@ -17,7 +17,7 @@ pub struct Section<'t> {
     read: usize,
 }
 
-impl<'t> Section<'t> {
+impl<'t> MshSection<'t> {
     /// The section that begins in a line (counted from zero), and the line after its end. Nothing where it is not
     /// ended.
     fn at(lines: &'t [&'t str], start: usize, name: &'t str) -> Option<(Self, usize)> {
@@ -40,11 +40,11 @@ impl<'t> Section<'t> {
     }
 
     /// The next line that is not empty, with its number.
-    pub fn following(&mut self) -> Option<Record<'t>> {
+    pub fn following(&mut self) -> Option<RecordWords<'t>> {
         while let Some(&line) = self.lines.get(self.read) {
             self.read += 1;
             if !line.trim().is_empty() {
-                return Some(Record::of(line, self.begins + self.read));
+                return Some(RecordWords::of(line, self.begins + self.read));
             }
         }
         None
@@ -54,7 +54,7 @@ impl<'t> Section<'t> {
     ///
     /// # Errors
     /// A message naming the line where the section ends too early.
-    pub fn record(&mut self) -> Result<Record<'t>, String> {
+    pub fn record(&mut self) -> Result<RecordWords<'t>, String> {
         let ends = self.begins + self.lines.len() + 1;
         self.following().ok_or_else(|| {
             format!(
@@ -95,13 +95,13 @@ impl<'t> Section<'t> {
 }
 
 /// The words of one line.
-pub struct Record<'t> {
+pub struct RecordWords<'t> {
     /// Its number in the file.
     pub line: usize,
     words: SplitWhitespace<'t>,
 }
 
-impl<'t> Record<'t> {
+impl<'t> RecordWords<'t> {
     /// Of a line and its number.
     #[must_use]
     pub fn of(text: &'t str, line: usize) -> Self {
@@ -169,7 +169,7 @@ impl<'t> Record<'t> {
 
 /// The sections of a file.
 pub struct Sections<'t> {
-    all: Vec<Section<'t>>,
+    all: Vec<MshSection<'t>>,
 }
 
 impl<'t> Sections<'t> {
@@ -183,7 +183,7 @@ impl<'t> Sections<'t> {
         while let Some(&line) = lines.get(at) {
             let line = line.trim();
             if let Some(name) = line.strip_prefix('$') {
-                let (section, next) = Section::at(lines, at, name).ok_or_else(|| {
+                let (section, next) = MshSection::at(lines, at, name).ok_or_else(|| {
                     let what = match name.strip_prefix("End") {
                         None => "is not ended: the file was cut",
                         Some(_) => "ends a section that was not begun: the file is damaged",
@@ -209,7 +209,7 @@ impl<'t> Sections<'t> {
     ///
     /// # Errors
     /// A message where there is a second one.
-    pub fn take_any(&mut self, name: &str) -> Result<Option<Section<'t>>, String> {
+    pub fn take_any(&mut self, name: &str) -> Result<Option<MshSection<'t>>, String> {
         if self.all.iter().any(|section| section.name == name) {
             return self.take(name).map(Some);
         }
@@ -220,9 +220,9 @@ impl<'t> Sections<'t> {
     ///
     /// # Errors
     /// A message where there is none, or a second one.
-    pub fn take(&mut self, name: &str) -> Result<Section<'t>, String> {
+    pub fn take(&mut self, name: &str) -> Result<MshSection<'t>, String> {
         let missing = || format!("the section ${name} is missing: the file was cut or is damaged");
-        let is_it = |section: &Section| section.name == name;
+        let is_it = |section: &MshSection| section.name == name;
         let found = self.all.iter().position(is_it).ok_or_else(missing)?;
         let section = self.all.remove(found);
         match self.all.iter().find(|s| is_it(s)) {

@@ -1,15 +1,15 @@
 //! The numbers of a section of version 4.1, which stand there as text or as bytes.
 
-use super::section::{Record, Section};
-use crate::io::mesh_file::place::Place;
+use super::section::{MshSection, RecordWords};
+use crate::io::mesh_file::place::FilePlace;
 
 /// Numbers one after the other, in records. What fails is a message naming the place.
 pub trait Stream {
     /// Where the section begins.
-    fn head(&self) -> Place;
+    fn head(&self) -> FilePlace;
 
     /// Where the record that is read stands.
-    fn place(&self) -> Place;
+    fn place(&self) -> FilePlace;
 
     fn name(&self) -> &str;
 
@@ -38,14 +38,14 @@ pub trait Stream {
 }
 
 /// A section of text: each record is a line.
-pub struct Lines<'t> {
-    section: Section<'t>,
-    record: Option<Record<'t>>,
+pub struct TextRecords<'t> {
+    section: MshSection<'t>,
+    record: Option<RecordWords<'t>>,
 }
 
-impl<'t> Lines<'t> {
+impl<'t> TextRecords<'t> {
     #[must_use]
-    pub fn of(section: Section<'t>) -> Self {
+    pub fn of(section: MshSection<'t>) -> Self {
         Self {
             section,
             record: None,
@@ -53,7 +53,7 @@ impl<'t> Lines<'t> {
     }
 
     /// The record that is read, the first where none has been begun.
-    fn record(&mut self) -> Result<&mut Record<'t>, String> {
+    fn record(&mut self) -> Result<&mut RecordWords<'t>, String> {
         let record = match self.record.take() {
             Some(record) => record,
             None => self.section.record()?,
@@ -62,14 +62,14 @@ impl<'t> Lines<'t> {
     }
 }
 
-impl Stream for Lines<'_> {
-    fn head(&self) -> Place {
-        Place::Line(self.section.first_line())
+impl Stream for TextRecords<'_> {
+    fn head(&self) -> FilePlace {
+        FilePlace::Line(self.section.first_line())
     }
 
-    fn place(&self) -> Place {
+    fn place(&self) -> FilePlace {
         let line = self.record.as_ref().map(|record| record.line);
-        Place::Line(line.unwrap_or(self.section.first_line()))
+        FilePlace::Line(line.unwrap_or(self.section.first_line()))
     }
 
     fn name(&self) -> &str {
@@ -94,7 +94,7 @@ impl Stream for Lines<'_> {
     }
 
     fn end(&mut self) -> Result<(), String> {
-        self.record.take().map_or(Ok(()), Record::ends)
+        self.record.take().map_or(Ok(()), RecordWords::ends)
     }
 
     fn tags(&mut self, count: u64) -> Result<Vec<u64>, String> {

@@ -56,24 +56,24 @@ pub struct Property {
     pub count: Option<Scalar>,
 }
 
-pub struct Element {
+pub struct PlyElement {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
 }
 
-pub struct Header {
+pub struct PlyHeader {
     pub form: Form,
-    pub elements: Vec<Element>,
+    pub elements: Vec<PlyElement>,
     /// Lines and bytes, the last line's end included.
     pub lines: usize,
     pub length: usize,
 }
 
-impl Header {
+impl PlyHeader {
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
         let mut form = None;
-        let mut elements: Vec<Element> = Vec::new();
+        let mut elements: Vec<PlyElement> = Vec::new();
         let mut length = 0;
         for (line, row) in (1..).zip(bytes.split_inclusive(|&b| b == b'\n')) {
             length += row.len();
@@ -97,7 +97,7 @@ impl Header {
                     if elements.iter().any(|e| e.name == name) {
                         return Err(wrong(&format!("{} is announced twice", quote(name))));
                     }
-                    elements.push(Element {
+                    elements.push(PlyElement {
                         name: name.to_owned(),
                         count: count.parse().map_err(|_| {
                             wrong(&format!("{} is no number of elements", quote(count)))
@@ -133,7 +133,7 @@ impl Header {
         Err("the PLY file is truncated: its header has no end_header".into())
     }
 
-    pub fn element(&self, name: &str) -> Option<&Element> {
+    pub fn element(&self, name: &str) -> Option<&PlyElement> {
         self.elements.iter().find(|e| e.name == name)
     }
 
@@ -142,7 +142,7 @@ impl Header {
         // The last line of a text may lack its end.
         let mut left = body.len() + 1;
         for element in &self.elements {
-            let Element { name, count, .. } = element;
+            let PlyElement { name, count, .. } = element;
             if *count > 0 && element.properties.is_empty() {
                 let name = quote(name);
                 return Err(format!(
@@ -162,7 +162,7 @@ impl Header {
     }
 }
 
-impl Element {
+impl PlyElement {
     /// Fewest bytes that one takes.
     fn least(&self, form: Form) -> usize {
         if form == Form::Text {

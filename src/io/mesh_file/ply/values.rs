@@ -3,17 +3,17 @@
 use std::str::{Lines, SplitAsciiWhitespace};
 
 use super::super::words::{at, number};
-use super::header::{Form, Header, Scalar};
+use super::header::{Form, PlyHeader, Scalar};
 use crate::plain::{lines_before, quote};
 
 pub struct Values<'b> {
-    source: Source<'b>,
+    source: ValueSource<'b>,
     /// The element that is being read, and its number from 0.
     element: String,
     index: usize,
 }
 
-enum Source<'b> {
+enum ValueSource<'b> {
     /// One element a line.
     Text {
         lines: Lines<'b>,
@@ -27,19 +27,19 @@ enum Source<'b> {
 }
 
 impl<'b> Values<'b> {
-    pub fn of(body: &'b [u8], header: &Header) -> Result<Self, String> {
+    pub fn of(body: &'b [u8], header: &PlyHeader) -> Result<Self, String> {
         let source = if header.form == Form::Text {
             let text = str::from_utf8(body).map_err(|e| {
                 let line = header.lines + 1 + lines_before(body, e.valid_up_to());
                 at(line, "this is not text")
             })?;
-            Source::Text {
+            ValueSource::Text {
                 lines: text.lines(),
                 words: "".split_ascii_whitespace(),
                 line: header.lines,
             }
         } else {
-            Source::Binary {
+            ValueSource::Binary {
                 rest: body,
                 big_endian: header.form == Form::BigEndian,
             }
@@ -57,7 +57,7 @@ impl<'b> Values<'b> {
             element.clone_into(&mut self.element);
         }
         self.index = index;
-        let Source::Text { lines, words, line } = &mut self.source else {
+        let ValueSource::Text { lines, words, line } = &mut self.source else {
             return Ok(());
         };
         for row in lines.by_ref() {
@@ -73,10 +73,10 @@ impl<'b> Values<'b> {
     /// The next number of the element.
     pub fn next(&mut self, scalar: Scalar) -> Result<f64, String> {
         let value = match &mut self.source {
-            Source::Text { words, line, .. } => {
+            ValueSource::Text { words, line, .. } => {
                 words.next().map(|word| number(word, *line)).transpose()?
             }
-            Source::Binary { rest, big_endian } => {
+            ValueSource::Binary { rest, big_endian } => {
                 let data = *rest;
                 data.split_at_checked(scalar.size()).map(|(own, after)| {
                     *rest = after;
@@ -103,7 +103,7 @@ impl<'b> Values<'b> {
 
     /// Whether the element is at its end.
     pub fn finish(&mut self) -> Result<(), String> {
-        let Source::Text { words, .. } = &mut self.source else {
+        let ValueSource::Text { words, .. } = &mut self.source else {
             return Ok(());
         };
         match words.next() {
@@ -118,7 +118,7 @@ impl<'b> Values<'b> {
     /// Whether the file is at its end.
     pub fn end(&mut self) -> Result<(), String> {
         match &mut self.source {
-            Source::Text { lines, line, .. } => {
+            ValueSource::Text { lines, line, .. } => {
                 for row in lines.by_ref() {
                     *line += 1;
                     if !row.trim_ascii().is_empty() {
@@ -131,12 +131,12 @@ impl<'b> Values<'b> {
                 Ok(())
             }
             // Some writers end with a line break, or fill up with zeros.
-            Source::Binary { rest, .. }
+            ValueSource::Binary { rest, .. }
                 if rest.iter().all(|b| *b == 0 || b.is_ascii_whitespace()) =>
             {
                 Ok(())
             }
-            Source::Binary { rest, .. } => Err(format!(
+            ValueSource::Binary { rest, .. } => Err(format!(
                 "the file goes on for {} bytes, but its header announces no more: its numbers of elements are too small",
                 rest.len()
             )),
@@ -147,8 +147,8 @@ impl<'b> Values<'b> {
     pub fn wrong(&self, what: &str) -> String {
         let said = format!("{} {} {what}", plain_name(&self.element), self.index);
         match &self.source {
-            Source::Text { line, .. } => at(*line, &said),
-            Source::Binary { .. } => said,
+            ValueSource::Text { line, .. } => at(*line, &said),
+            ValueSource::Binary { .. } => said,
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use crate::lanes::{exponential, logarithm, wide};
-use crate::placement::expected_error::scene::{LANES, NUISANCES, Report, Scene};
+use crate::placement::expected_error::scene::{LANES, NUISANCES, Report, TouchScene};
 
 /// Unknowns that every touch has: along, across and force.
 pub(in crate::placement::expected_error) const PLAIN: usize = 3;
@@ -17,7 +17,7 @@ pub(super) const FORCE: usize = 2;
 
 /// The filters at all places, for one force.
 #[derive(Clone)]
-pub(super) struct Filters {
+pub(super) struct PlaceFilters {
     /// Unknowns of each.
     unknowns: usize,
     /// Upper triangles of the covariances, block by block: of along, across, force, and what else there is to find.
@@ -27,16 +27,16 @@ pub(super) struct Filters {
 }
 
 /// What a site's reading does to the filters at all places, for one force.
-pub(super) struct Rows {
+pub(super) struct FilterRows {
     /// Block by block: of the reading over its deviation, by each unknown.
     slopes: Vec<Lane>,
     /// Of each block.
-    said: Vec<Said>,
+    said: Vec<BlockReading>,
 }
 
 /// What there is to know of a reading at the places of a block, whatever it is.
 #[derive(Clone)]
-struct Said {
+struct BlockReading {
     /// One over the deviation.
     scale: Lane,
     /// Half over the variance of what is predicted, and the logarithm that belongs to it.
@@ -47,7 +47,7 @@ struct Said {
     sharpness: Lane,
 }
 
-impl Said {
+impl BlockReading {
     const NOTHING: Self = Self {
         scale: [0.0; LANES],
         half: [0.0; LANES],
@@ -57,10 +57,10 @@ impl Said {
     };
 }
 
-impl Filters {
+impl PlaceFilters {
     /// Before anything is read, at the places of a scene: within their reach (filled up with 1), with a force of some
     /// variance, and all else of unit variance.
-    pub(super) fn new(scene: &Scene, reaches: &[Lane], force: f32) -> Self {
+    pub(super) fn new(scene: &TouchScene, reaches: &[Lane], force: f32) -> Self {
         let unknowns = PLAIN + scene.unknowns.len();
         let entry = |reaches: &Lane, (i, j): (usize, usize)| match i {
             _ if i != j => [0.0; LANES],
@@ -85,16 +85,16 @@ impl Filters {
     }
 
     /// Room for what a reading does to them.
-    pub(super) fn rows(&self) -> Rows {
+    pub(super) fn rows(&self) -> FilterRows {
         let blocks = self.blocks();
-        Rows {
+        FilterRows {
             slopes: vec![[0.0; LANES]; self.unknowns * blocks],
-            said: vec![Said::NOTHING; blocks],
+            said: vec![BlockReading::NOTHING; blocks],
         }
     }
 
     /// What is to be known of no reading at all.
-    pub(super) fn unread(&self) -> Rows {
+    pub(super) fn unread(&self) -> FilterRows {
         let mut rows = self.rows();
         let blocks = self.covariances.chunks_exact(triangle(self.unknowns));
         for (said, covariance) in rows.said.iter_mut().zip(blocks) {
@@ -193,7 +193,7 @@ wide! {
     pub(super) fn sum_masses_with<'a>(
         unknowns: usize,
         thought: Thought<'a>,
-        rows: &'a Rows,
+        rows: &'a FilterRows,
         positions: &'a [[Lane; 3]],
         reading: f32,
         own: f32,
@@ -209,7 +209,7 @@ wide! {
 #[inline(always)]
 fn sum_of<const N: usize>(
     thought: &Thought,
-    rows: &Rows,
+    rows: &FilterRows,
     positions: &[[Lane; 3]],
     reading: f32,
     own: f32,
@@ -245,7 +245,7 @@ wide! {
         unknowns: usize,
         estimates: &'a mut [Lane],
         costs: &'a mut [Lane],
-        rows: &'a Rows,
+        rows: &'a FilterRows,
         gains: &'a [Lane],
         blocks: &'a [u32],
         reading: f32,
@@ -262,7 +262,7 @@ wide! {
 fn correct_of<const N: usize>(
     estimates: &mut [Lane],
     costs: &mut [Lane],
-    rows: &Rows,
+    rows: &FilterRows,
     gains: &[Lane],
     blocks: &[u32],
     reading: f32,
@@ -290,10 +290,10 @@ fn correct_of<const N: usize>(
 wide! {
     /// Fills in what a reading of presses of some force (N) does to the filters at all places.
     pub(super) fn predict<'a>(
-        filters: &'a Filters,
+        filters: &'a PlaceFilters,
         report: &'a Report<'a>,
         force: f32,
-        rows: &'a mut Rows,
+        rows: &'a mut FilterRows,
     ) {
         for_unknowns!(filters.unknowns, predict_of(filters, report, force, rows));
     }
@@ -304,7 +304,12 @@ wide! {
     reason = "part of loops that are compiled for several instruction sets"
 )]
 #[inline(always)]
-fn predict_of<const N: usize>(filters: &Filters, report: &Report, force: f32, rows: &mut Rows) {
+fn predict_of<const N: usize>(
+    filters: &PlaceFilters,
+    report: &Report,
+    force: f32,
+    rows: &mut FilterRows,
+) {
     let plain = [report.slopes[0], report.slopes[1], report.value];
     let drift = [filters.drift.unwrap_or(0.0); LANES];
     let mut by: [&[Lane]; N] = [&[]; N];
@@ -325,7 +330,7 @@ fn predict_of<const N: usize>(filters: &Filters, report: &Report, force: f32, ro
         let by: [&Lane; N] = from_fn(|i| by[i].get(b).unwrap_or(&drift));
         let covariance = square::<N, Lane>(covariance);
         let mut own_slopes = [[0.0; LANES]; N];
-        let mut own = Said::NOTHING;
+        let mut own = BlockReading::NOTHING;
         for l in 0..LANES {
             let scale = (1.0 + force * force * variance[l]).sqrt().recip();
             let mut row = [0.0; N];
@@ -360,14 +365,14 @@ fn predict_of<const N: usize>(filters: &Filters, report: &Report, force: f32, ro
 }
 
 /// By how much the filters at all places correct each unknown, block by block.
-pub(super) fn corrections(filters: &Filters, rows: &Rows) -> Vec<Lane> {
+pub(super) fn corrections(filters: &PlaceFilters, rows: &FilterRows) -> Vec<Lane> {
     let mut gains = vec![[0.0; LANES]; rows.slopes.len()];
     gains_into(filters, rows, &mut gains);
     gains
 }
 
 wide! {
-    fn gains_into<'a>(filters: &'a Filters, rows: &'a Rows, gains: &'a mut [Lane]) {
+    fn gains_into<'a>(filters: &'a PlaceFilters, rows: &'a FilterRows, gains: &'a mut [Lane]) {
         for_unknowns!(filters.unknowns, gains_of(filters, rows, gains));
     }
 }
@@ -377,7 +382,7 @@ wide! {
     reason = "part of loops that are compiled for several instruction sets"
 )]
 #[inline(always)]
-fn gains_of<const N: usize>(filters: &Filters, rows: &Rows, gains: &mut [Lane]) {
+fn gains_of<const N: usize>(filters: &PlaceFilters, rows: &FilterRows, gains: &mut [Lane]) {
     let blocks = filters.covariances.chunks_exact(triangle(N));
     let rows = rows.slopes.as_chunks::<N>().0.iter().zip(&rows.said);
     for ((covariance, (slopes, said)), gains) in blocks.zip(rows).zip(gains.as_chunks_mut().0) {
@@ -398,7 +403,7 @@ fn gains_of<const N: usize>(filters: &Filters, rows: &Rows, gains: &mut [Lane]) 
 
 wide! {
     /// What a reading leaves of the filters' covariances at all places.
-    pub(super) fn shrink<'a>(filters: &'a mut Filters, rows: &'a Rows, gains: &'a [Lane]) {
+    pub(super) fn shrink<'a>(filters: &'a mut PlaceFilters, rows: &'a FilterRows, gains: &'a [Lane]) {
         let unknowns = filters.unknowns;
         let blocks = filters.covariances.chunks_exact_mut(triangle(unknowns));
         let gains = gains.chunks_exact(unknowns);

@@ -4,23 +4,23 @@ use nalgebra::SMatrix;
 
 use super::filters::MOST;
 use super::unknowns::{Unknowns, row, thought, within};
-use crate::placement::expected_error::scene::{Place, Report, Scene};
+use crate::placement::expected_error::scene::{Report, ScenePlace, TouchScene};
 
-type Covariance = SMatrix<f64, MOST, MOST>;
+type PlaceCovariance = SMatrix<f64, MOST, MOST>;
 
 /// What is thought of a touch around a place.
 pub(super) struct Single {
-    pub covariance: Covariance,
+    pub covariance: PlaceCovariance,
     pub estimate: Unknowns,
     pub cost: f64,
 }
 
 impl Single {
     /// Nothing was read yet.
-    pub fn at_rest(scene: &Scene, place: &Place) -> Self {
+    pub fn at_rest(scene: &TouchScene, place: &ScenePlace) -> Self {
         let known = within(scene, place.reach);
         Self {
-            covariance: Covariance::from_diagonal(&known.component_mul(&known)),
+            covariance: PlaceCovariance::from_diagonal(&known.component_mul(&known)),
             estimate: thought(if scene.hardest.is_some() { 0.0 } else { 1.0 }),
             cost: -place.mass.max(1e-12).ln(),
         }
@@ -30,7 +30,7 @@ impl Single {
     /// place of a number.
     pub fn correct(
         &mut self,
-        scene: &Scene,
+        scene: &TouchScene,
         (here, place): (&Report, usize),
         (force, reading): (f64, f64),
     ) {

@@ -3,13 +3,15 @@ use nalgebra::SMatrix;
 use super::*;
 use crate::budget::unwatched;
 use crate::dataset::SignalMatrix;
-use crate::placement::expected_error::{Detail, Forces, Knowledge, NUISANCES, Shared, certify};
+use crate::placement::expected_error::{
+    Detail, NUISANCES, SceneForces, SharedUnknowns, SignalKnowledge, certify,
+};
 
 const SIDE: usize = 9;
 const SITES: usize = 5;
 
 /// Five sites that feel touches on a plane of 64 mm, a force along it as `felt` says, and a drift.
-fn scene(felt: f64, nuisances: [Option<f64>; NUISANCES], drift: f64) -> Scene {
+fn scene(felt: f64, nuisances: [Option<f64>; NUISANCES], drift: f64) -> TouchScene {
     let at = |t: usize| [(t % SIDE) as f64 * 8.0, (t / SIDE) as f64 * 8.0, 0.0];
     let targets: Vec<[f64; 3]> = (0..SIDE * SIDE).map(at).collect();
     let near = |site: usize, [x, y, _]: [f64; 3]| {
@@ -24,18 +26,18 @@ fn scene(felt: f64, nuisances: [Option<f64>; NUISANCES], drift: f64) -> Scene {
         let way = 0.11 * (x + y) + 1.7 * site as f64;
         [0.0, felt * way.sin(), felt * way.cos()]
     };
-    let shared = Shared {
+    let shared = SharedUnknowns {
         felt: &pushed,
         nuisances,
         drift,
     };
-    let known = Knowledge {
+    let known = SignalKnowledge {
         noise: 1.0,
         variance: None,
         shared: Some(&shared),
         density: None,
         among: None,
-        forces: Some(Forces {
+        forces: Some(SceneForces {
             touches: &forces,
             coming: [3.0, 12.0],
             possible: 20.0,
@@ -46,11 +48,11 @@ fn scene(felt: f64, nuisances: [Option<f64>; NUISANCES], drift: f64) -> Scene {
         places: 60,
         presses: 30,
     };
-    Scene::new(&x, &targets, &known, detail, &unwatched).unwrap()
+    TouchScene::new(&x, &targets, &known, detail, &unwatched).unwrap()
 }
 
 /// What a site reads of a press as the gauge of a turn.
-fn reading(scene: &Scene, (site, turn): (usize, usize), press: usize, force: f64) -> f64 {
+fn reading(scene: &TouchScene, (site, turn): (usize, usize), press: usize, force: f64) -> f64 {
     let report = scene.at_presses.of(site);
     let (row, variance) = row(scene, &report, press, force);
     let made = |k: usize| row[PLAIN + k] * f64::from(scene.made()[k * scene.presses.len() + press]);
@@ -61,7 +63,7 @@ fn reading(scene: &Scene, (site, turn): (usize, usize), press: usize, force: f64
 
 /// How far off the linear estimator of the bank's own prior is at a press (mm²), where the unknowns really have other
 /// variances: C (Σ r rᵀ + P⁻¹ S P⁻¹) C, with C = (P⁻¹ + Σ r rᵀ)⁻¹.
-fn by_algebra(scene: &Scene, level: usize, press: usize) -> [f64; 3] {
+fn by_algebra(scene: &TouchScene, level: usize, press: usize) -> [f64; 3] {
     let known = prior(scene, &scene.around[press]);
     let used = PLAIN + scene.unknowns.len();
     let invert = |v: f64| if v > 0.0 { v.powi(-2) } else { 0.0 };
@@ -107,7 +109,7 @@ fn whoever_allows_for_more_than_comes_is_as_far_off_as_algebra_says() {
 #[test]
 fn what_all_share_hides_less_than_what_each_has_for_itself() {
     let set = [0, 1, 2, 3, 4];
-    let error = |scene: &Scene| Bank::of(scene, &set).error();
+    let error = |scene: &TouchScene| Bank::of(scene, &set).error();
     let [without, drifting] = [0.0, 6.0].map(|drift| error(&scene(0.0, [None; NUISANCES], drift)));
     // Of each for itself: as if readings were in units of as much more noise.
     let mut alone = scene(0.0, [None; NUISANCES], 0.0);
@@ -222,12 +224,12 @@ fn presses_side_by_side_are_what_one_filter_says() {
         let scene = scene(2.0, [None, made, made], 3.0);
         let set = [3, 0, 4, 1];
         let bank = Bank::of(&scene, &set);
-        let mut read = Read::default();
+        let mut read = SiteReading::default();
         bank.truth.read(&scene, (2, set.len()), &mut read);
         for level in &scene.levels {
             for press in level.presses.clone() {
                 let around = &scene.around[press];
-                let place = Place {
+                let place = ScenePlace {
                     position: scene.presses[press].position,
                     reach: around.reach,
                     mass: around.own_mass,

@@ -8,7 +8,7 @@ use super::filters::{FORCE, MOST, PLAIN, entries, for_unknowns, place_of, square
 use super::unknowns::prior;
 use crate::lanes::{logarithm_to_rounding, wide};
 use crate::placement::expected_error::elliptic::mean_length;
-use crate::placement::expected_error::scene::{Report, Scene};
+use crate::placement::expected_error::scene::{Report, TouchScene};
 
 /// Presses that are computed side by side.
 const LANES: usize = 8;
@@ -32,7 +32,7 @@ pub(super) struct TrueFilters {
 
 /// What a site's reading makes of them.
 #[derive(Clone, Default)]
-pub(super) struct Read {
+pub(super) struct SiteReading {
     /// In units of the noise.
     pub readings: Vec<f32>,
     /// What presses cost with it.
@@ -51,7 +51,7 @@ pub(super) struct Read {
 
 impl TrueFilters {
     /// Nothing read yet; a press is thought to be as hard as `force` (N).
-    pub fn new(scene: &Scene, force: f64) -> Self {
+    pub fn new(scene: &TouchScene, force: f64) -> Self {
         let unknowns = PLAIN + scene.unknowns.len();
         let blocks = scene.presses.len().div_ceil(LANES);
         let mut filters = Self {
@@ -93,7 +93,7 @@ impl TrueFilters {
     }
 
     /// Of where the estimate of a press is that is made with these gauges: along, along-across, across (mm²).
-    pub fn off_by(&self, scene: &Scene, press: usize) -> [f64; 3] {
+    pub fn off_by(&self, scene: &TouchScene, press: usize) -> [f64; 3] {
         let (block, lane, n) = (press / LANES, press % LANES, self.unknowns);
         let entry = |i, j| self.covariances[block * triangle(n) + place_of(n, i, j)][lane];
         let mut off = [entry(0, 0), entry(0, 1), entry(1, 1)];
@@ -109,13 +109,13 @@ impl TrueFilters {
     /// What a site reads of all presses as the gauge of a turn, and what that makes of the filters.
     ///
     /// Noise is of the turn and not of the site: else the sites with the luckiest noise would be chosen.
-    pub fn read(&self, scene: &Scene, (site, turn): (usize, usize), into: &mut Read) {
+    pub fn read(&self, scene: &TouchScene, (site, turn): (usize, usize), into: &mut SiteReading) {
         into.fit(self.costs.len(), self.unknowns);
         for (k, draw) in scene.draws(turn).iter().enumerate() {
             into.draws[k / LANES][k % LANES] = f64::from(*draw);
         }
         let drift = scene.unknowns.iter().find_map(|u| u.drift());
-        let task = Task {
+        let task = TruthTask {
             report: &scene.at_presses.of(site),
             drift: drift.unwrap_or(0.0),
             less: less(scene),
@@ -124,7 +124,7 @@ impl TrueFilters {
     }
 
     /// Takes a reading into account.
-    pub fn take(&mut self, read: &Read) {
+    pub fn take(&mut self, read: &SiteReading) {
         let n = self.unknowns;
         let covariances = self.covariances.chunks_exact_mut(triangle(n));
         let filters = covariances.zip(self.estimates.chunks_exact_mut(n));
@@ -148,7 +148,7 @@ impl TrueFilters {
 }
 
 /// How much less each unknown really varies than is allowed for, in squares; nothing of the first ones.
-fn less(scene: &Scene) -> [f64; MOST] {
+fn less(scene: &TouchScene) -> [f64; MOST] {
     let mut less = [0.0; MOST];
     for (less, unknown) in less.iter_mut().skip(PLAIN).zip(&scene.unknowns) {
         *less = 1.0 - unknown.made().powi(2);
@@ -156,7 +156,7 @@ fn less(scene: &Scene) -> [f64; MOST] {
     less
 }
 
-impl Read {
+impl SiteReading {
     fn fit(&mut self, blocks: usize, unknowns: usize) {
         let count = blocks * LANES;
         self.readings.resize(count, 0.0);
@@ -175,7 +175,7 @@ impl Read {
 }
 
 /// What a gauge reads of all presses, and what there is to know of its unknowns.
-struct Task<'a> {
+struct TruthTask<'a> {
     report: &'a Report<'a>,
     /// What a drift reads of one deviation.
     drift: f64,
@@ -184,7 +184,7 @@ struct Task<'a> {
 }
 
 wide! {
-    fn weigh<'a>(filters: &'a TrueFilters, task: &'a Task<'a>, into: &'a mut Read) {
+    fn weigh<'a>(filters: &'a TrueFilters, task: &'a TruthTask<'a>, into: &'a mut SiteReading) {
         for_unknowns!(filters.unknowns, weigh_all(filters, task, into));
     }
 }
@@ -194,7 +194,7 @@ wide! {
     reason = "part of loops that are compiled for several instruction sets"
 )]
 #[inline(always)]
-fn weigh_all<const N: usize>(filters: &TrueFilters, task: &Task, into: &mut Read) {
+fn weigh_all<const N: usize>(filters: &TrueFilters, task: &TruthTask, into: &mut SiteReading) {
     let Report {
         value,
         slopes,
@@ -219,7 +219,7 @@ fn weigh_all<const N: usize>(filters: &TrueFilters, task: &Task, into: &mut Read
         let (variance, force) = (&variances[b], &filters.forces[b]);
         let (made, draws, known) = (&filters.made[b], &into.draws[b], &filters.costs[b]);
         let covariance = square::<N, Lanes>(covariance);
-        let mut own = Weighed::<N>::NOTHING;
+        let mut own = WeighedPresses::<N>::NOTHING;
         for l in 0..LANES {
             let dev = (1.0 + force[l] * force[l] * f64::from(variance[l])).sqrt();
             let scale = dev.recip();
@@ -263,7 +263,7 @@ fn weigh_all<const N: usize>(filters: &TrueFilters, task: &Task, into: &mut Read
 }
 
 /// What a reading of the presses of a block makes of their filters.
-struct Weighed<const N: usize> {
+struct WeighedPresses<const N: usize> {
     reading: Lanes,
     length: Lanes,
     predicted: Lanes,
@@ -272,7 +272,7 @@ struct Weighed<const N: usize> {
     spread: [Lanes; N],
 }
 
-impl<const N: usize> Weighed<N> {
+impl<const N: usize> WeighedPresses<N> {
     const NOTHING: Self = Self {
         reading: [0.0; LANES],
         length: [0.0; LANES],
@@ -287,7 +287,7 @@ impl<const N: usize> Weighed<N> {
         reason = "part of loops that are compiled for several instruction sets"
     )]
     #[inline(always)]
-    fn put(&self, into: &mut Read, block: usize) {
+    fn put(&self, into: &mut SiteReading, block: usize) {
         let of = block * LANES..(block + 1) * LANES;
         for (out, value) in into.readings[of.clone()].iter_mut().zip(self.reading) {
             *out = value as f32;

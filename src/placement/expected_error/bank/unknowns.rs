@@ -3,21 +3,21 @@
 use nalgebra::SVector;
 
 use super::filters::{MOST, PLAIN};
-use crate::placement::expected_error::scene::{Neighbourhood, Report, Scene};
+use crate::placement::expected_error::scene::{Neighbourhood, Report, TouchScene};
 
 /// Of all unknowns that there may be; zero of those that are not asked for.
 pub(in crate::placement::expected_error) type Unknowns = SVector<f64, MOST>;
 
 /// Deviations of what is known of a press before anything is read: along, across (mm), force (N), and the rest.
 pub(in crate::placement::expected_error) fn prior(
-    scene: &Scene,
+    scene: &TouchScene,
     around: &Neighbourhood,
 ) -> Unknowns {
     within(scene, around.reach)
 }
 
 /// The same of a touch within some reach (mm).
-pub(super) fn within(scene: &Scene, reach: f64) -> Unknowns {
+pub(super) fn within(scene: &TouchScene, reach: f64) -> Unknowns {
     let mut known = Unknowns::zeros();
     known.fixed_rows_mut::<2>(0).fill(reach);
     known[2] = scene.hardest.unwrap_or(0.0);
@@ -35,7 +35,7 @@ pub(super) fn thought(force: f64) -> Unknowns {
 /// What a site's reading of a press of some force says of each unknown, over the reading's deviation, and the square of
 /// that.
 pub(in crate::placement::expected_error) fn row(
-    scene: &Scene,
+    scene: &TouchScene,
     report: &Report,
     press: usize,
     force: f64,

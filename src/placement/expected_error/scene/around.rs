@@ -20,7 +20,7 @@ pub(super) struct Around<'a> {
 }
 
 /// A neighbour, and what it weighs.
-pub(super) struct Neighbour {
+pub(super) struct PlaceNeighbour {
     pub place: usize,
     /// In both slopes (1/mm), of the difference to it.
     pub slopes: [f64; 2],
@@ -29,9 +29,9 @@ pub(super) struct Neighbour {
 }
 
 /// A place's neighbours, and the two directions (of unit length) that slopes are along.
-pub(super) struct Surroundings {
+pub(super) struct PlaceSurroundings {
     pub plane: [DVec3; 2],
-    pub neighbours: Vec<Neighbour>,
+    pub neighbours: Vec<PlaceNeighbour>,
 }
 
 impl<'a> Around<'a> {
@@ -54,13 +54,13 @@ impl<'a> Around<'a> {
     }
 
     /// What lies around a place; no neighbours where it is alone.
-    pub fn of(&self, at: usize) -> Surroundings {
+    pub fn of(&self, at: usize) -> PlaceSurroundings {
         let near = self.nearest(at);
         let offsets: Vec<DVec3> = (near.iter())
             .map(|&k| self.positions[k] - self.positions[at])
             .collect();
         if offsets.is_empty() {
-            return Surroundings {
+            return PlaceSurroundings {
                 plane: [DVec3::X, DVec3::Y],
                 neighbours: Vec::new(),
             };
@@ -71,10 +71,10 @@ impl<'a> Around<'a> {
             .collect();
         let weights = slope_weights(&flat).into_iter().zip(guess_weights(&flat));
         let neighbours = near.iter().zip(weights);
-        Surroundings {
+        PlaceSurroundings {
             plane,
             neighbours: neighbours
-                .map(|(&place, (slopes, guess))| Neighbour {
+                .map(|(&place, (slopes, guess))| PlaceNeighbour {
                     place,
                     slopes,
                     guess,
@@ -211,12 +211,12 @@ mod tests {
         let slope = DVec3::new(0.3, -0.2, 0.0);
         let value = |k: usize| 5.0 + positions[k].dot(slope);
         for at in [0, 60, 199] {
-            let Surroundings { plane, neighbours } = around.of(at);
+            let PlaceSurroundings { plane, neighbours } = around.of(at);
             let guessed: f64 = neighbours.iter().map(|n| n.guess * value(n.place)).sum();
             // To the ridge.
             assert!((guessed - value(at)).abs() < 0.02, "{guessed}");
             for (k, axis) in plane.into_iter().enumerate() {
-                let rise = |n: &Neighbour| n.slopes[k] * (value(n.place) - value(at));
+                let rise = |n: &PlaceNeighbour| n.slopes[k] * (value(n.place) - value(at));
                 let found: f64 = neighbours.iter().map(rise).sum();
                 assert!((found - slope.dot(axis)).abs() < 1e-3, "{found}");
             }

@@ -17,7 +17,7 @@ pub(super) const REACH: f64 = 0.65;
 
 /// A place that a touch may come to.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::placement::expected_error) struct Place {
+pub(in crate::placement::expected_error) struct ScenePlace {
     /// mm.
     pub position: DVec3,
     /// Standard deviation along the surface (mm) of where a touch is that this place stands for.
@@ -42,9 +42,9 @@ pub(in crate::placement::expected_error) struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    pub(super) fn of(press: &Place, places: &[Place]) -> Self {
-        let away = |p: &Place| p.position.distance_squared(press.position);
-        let is_own = |p: &Place| away(p) <= (OWN * p.reach).powi(2);
+    pub(super) fn of(press: &ScenePlace, places: &[ScenePlace]) -> Self {
+        let away = |p: &ScenePlace| p.position.distance_squared(press.position);
+        let is_own = |p: &ScenePlace| away(p) <= (OWN * p.reach).powi(2);
         let own = || (places.iter().enumerate()).filter(|(_, p)| is_own(p));
         let mass: f64 = own().map(|(_, p)| p.mass).sum();
         let nearest = places.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -58,7 +58,7 @@ impl Neighbourhood {
 }
 
 /// Presses of one force.
-pub(in crate::placement::expected_error) struct Level {
+pub(in crate::placement::expected_error) struct ForceLevel {
     /// N; 1 where forces do not matter.
     pub force: f64,
     /// Of the presses.
@@ -73,9 +73,9 @@ pub(super) fn in_turns(places: &[usize]) -> Vec<usize> {
 }
 
 /// A third of the presses for each force.
-pub(super) fn levels(presses: usize, range: Option<[f64; 2]>) -> Vec<Level> {
+pub(super) fn levels(presses: usize, range: Option<[f64; 2]>) -> Vec<ForceLevel> {
     let Some([lightest, hardest]) = range else {
-        return vec![Level {
+        return vec![ForceLevel {
             force: 1.0,
             presses: 0..presses,
         }];
@@ -83,7 +83,7 @@ pub(super) fn levels(presses: usize, range: Option<[f64; 2]>) -> Vec<Level> {
     (0..LEVELS)
         .map(|k| {
             let share = (k as f64 + 0.5) / LEVELS as f64;
-            Level {
+            ForceLevel {
                 force: lightest * (hardest / lightest).powf(share),
                 presses: k * presses / LEVELS..(k + 1) * presses / LEVELS,
             }
@@ -151,7 +151,7 @@ pub(super) fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
 }
 
 /// Some of the places with what each stands for: the places that are nearest to it, each of which has some weight.
-pub(super) fn standing(positions: &[DVec3], weights: &[f64], of: &[usize]) -> Vec<Place> {
+pub(super) fn standing(positions: &[DVec3], weights: &[f64], of: &[usize]) -> Vec<ScenePlace> {
     let nearest = |at: &DVec3| {
         let away = |k: &usize| positions[of[*k]].distance_squared(*at);
         (0..of.len()).min_by(|a, b| away(a).total_cmp(&away(b)))
@@ -166,7 +166,7 @@ pub(super) fn standing(positions: &[DVec3], weights: &[f64], of: &[usize]) -> Ve
     }
     of.par_iter()
         .zip(masses)
-        .map(|(&at, mass)| Place {
+        .map(|(&at, mass)| ScenePlace {
             position: positions[at],
             reach: REACH * spacing(positions, of.iter().copied(), at),
             mass,

@@ -9,13 +9,13 @@
 
 use rayon::prelude::*;
 
-use super::around::{Around, Neighbour};
+use super::around::{Around, PlaceNeighbour};
 use super::merged::Merged;
 use crate::dataset::SignalMatrix;
 
 /// The variance of each site's reading about the template of each place, as it is found in data.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scatter {
+pub struct ReadingScatter {
     /// The place of each touch.
     place_of: Vec<usize>,
     /// Its force squared (N²); 1 where forces are not known.
@@ -32,19 +32,20 @@ const PRIOR_PLACES: f64 = 2.0;
 /// As many repeats, for the same reason.
 const PRIOR_REPEATS: f64 = 8.0;
 
-impl Scatter {
+impl ReadingScatter {
     /// Of signals (sites × touches) at positions (mm), per newton where the force of each touch (N) is known.
     #[must_use]
     pub fn of(x: &SignalMatrix, targets: &[[f64; 3]], forces: Option<&[f64]>) -> Self {
         let merged = Merged::new(targets, forces);
         let places = merged.len();
         let around = Around::new(&merged.positions, &merged.groups);
-        let near: Vec<Vec<Neighbour>> = (0..places)
+        let near: Vec<Vec<PlaceNeighbour>> = (0..places)
             .into_par_iter()
             .map(|k| around.of(k).neighbours)
             .collect();
         let force = |t: usize| forces.map_or(1.0, |f| f[t]);
-        let of_site = |site: usize| Seen::new(x.row(site), &merged, &force, &near).variances(&near);
+        let of_site =
+            |site: usize| SeenSite::new(x.row(site), &merged, &force, &near).variances(&near);
         let rows: Vec<(Vec<f64>, f64)> = (0..x.rows()).into_par_iter().map(of_site).collect();
         let mut place_of = vec![0; targets.len()];
         for (place, touches) in merged.touches.iter().enumerate() {
@@ -81,7 +82,7 @@ impl Scatter {
 }
 
 /// What is seen of one site at every place, per newton.
-struct Seen {
+struct SeenSite {
     /// Squares of the readings.
     squares: Vec<f64>,
     /// Of what neighbours leave, as the variance of one place.
@@ -90,12 +91,12 @@ struct Seen {
     repeats: Vec<[f64; 2]>,
 }
 
-impl Seen {
+impl SeenSite {
     fn new(
         readings: &[f64],
         merged: &Merged,
         force: &dyn Fn(usize) -> f64,
-        near: &[Vec<Neighbour>],
+        near: &[Vec<PlaceNeighbour>],
     ) -> Self {
         let values: Vec<f64> = (0..merged.len())
             .map(|k| merged.value(readings, k))
@@ -117,7 +118,7 @@ impl Seen {
     }
 
     /// The variance of a reading at each place; and its mean over that of the squares.
-    fn variances(&self, near: &[Vec<Neighbour>]) -> (Vec<f64>, f64) {
+    fn variances(&self, near: &[Vec<PlaceNeighbour>]) -> (Vec<f64>, f64) {
         let (square, left) = (mean_or_zero(&self.squares), mean_or_zero(&self.left));
         let [off, free] = sums(&self.repeats);
         // Of a single press; what neighbours leave is the first guess at it.
@@ -153,7 +154,7 @@ impl Seen {
 
 /// The square of what neighbours leave of a value, over what it would be if all were off by one and the same
 /// variance; nothing where there are none.
-fn left(value: f64, near: &[Neighbour], values: &[f64]) -> f64 {
+fn left(value: f64, near: &[PlaceNeighbour], values: &[f64]) -> f64 {
     if near.is_empty() {
         return 0.0;
     }
@@ -188,7 +189,7 @@ mod tests {
     }
 
     /// The share that is found of two sites, with a wave this long (mm) and normal errors of this deviation.
-    fn found(turns: usize, wave: f64, deviation: f64) -> (Scatter, f64) {
+    fn found(turns: usize, wave: f64, deviation: f64) -> (ReadingScatter, f64) {
         let targets = skin(turns);
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let values = (0..2).flat_map(|site| {
@@ -198,7 +199,7 @@ mod tests {
                 .collect::<Vec<f64>>()
         });
         let x = SignalMatrix::new(targets.len(), values.collect());
-        let scatter = Scatter::of(&x, &targets, None);
+        let scatter = ReadingScatter::of(&x, &targets, None);
         let mean = (0..targets.len())
             .map(|t| scatter.variance(0, t))
             .sum::<f64>();
@@ -232,7 +233,7 @@ mod tests {
         let forces: Vec<f64> = (0..800).map(|t| if t < 400 { 1.0 } else { 4.0 }).collect();
         let x = (0..800).map(|t| forces[t] * if t < 400 { 1.0 } else { 1.2 });
         let x = SignalMatrix::new(800, x.collect());
-        let scatter = Scatter::of(&x, &targets, Some(&forces));
+        let scatter = ReadingScatter::of(&x, &targets, Some(&forces));
         assert!((scatter.variance(0, 401) / scatter.variance(0, 1) - 16.0).abs() < 1e-9);
         assert!(scatter.variance(0, 1) > 0.01, "{}", scatter.variance(0, 1));
     }
@@ -240,9 +241,9 @@ mod tests {
     #[test]
     fn a_single_place_scatters_by_its_repeats_alone() {
         let x = SignalMatrix::new(4, vec![1.0, 2.0, 1.0, 2.0]);
-        let scatter = Scatter::of(&x, &[[1.0; 3]; 4], None);
+        let scatter = ReadingScatter::of(&x, &[[1.0; 3]; 4], None);
         assert!(scatter.variance(0, 0) > 0.0);
-        let one = Scatter::of(&SignalMatrix::new(1, vec![3.0]), &[[1.0; 3]], None);
+        let one = ReadingScatter::of(&SignalMatrix::new(1, vec![3.0]), &[[1.0; 3]], None);
         assert!(one.variance(0, 0).abs() < f64::MIN_POSITIVE);
     }
 }

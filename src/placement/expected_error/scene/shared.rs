@@ -9,7 +9,7 @@ pub const NUISANCES: usize = 3;
 const MADE_SEED: u64 = 0x5ab1e;
 
 /// What is felt together.
-pub struct Shared<'a> {
+pub struct SharedUnknowns<'a> {
     /// What a site reads (site, touch) where each nuisance is off by the deviation that the estimator allows for, in the
     /// signal's unit and at the force of the touch.
     pub felt: &'a (dyn Fn(usize, usize) -> [f64; NUISANCES] + Sync),
@@ -21,14 +21,14 @@ pub struct Shared<'a> {
 
 /// Something to be found of a touch beside place and force, of unit deviation for whoever looks for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::placement::expected_error) enum Unknown {
+pub(in crate::placement::expected_error) enum TouchUnknown {
     /// A nuisance of the touch, which grows with its force: its number, and how far off it really is.
     OfTouch(usize, f64),
     /// What every channel has drifted by (in units of readings), whatever touches.
     Drift(f64),
 }
 
-impl Unknown {
+impl TouchUnknown {
     /// Its number, of what grows with the touch.
     pub fn of_touch(self) -> Option<usize> {
         match self {
@@ -54,20 +54,20 @@ impl Unknown {
     }
 }
 
-impl Shared<'_> {
+impl SharedUnknowns<'_> {
     /// What there is to find, those of the touch first; readings are multiplied by `unit`.
-    pub(super) fn unknowns(&self, unit: f64) -> Vec<Unknown> {
+    pub(super) fn unknowns(&self, unit: f64) -> Vec<TouchUnknown> {
         let nuisances = self.nuisances.iter().enumerate();
-        let mut all: Vec<Unknown> = nuisances
-            .filter_map(|(k, made)| Some(Unknown::OfTouch(k, (*made)?)))
+        let mut all: Vec<TouchUnknown> = nuisances
+            .filter_map(|(k, made)| Some(TouchUnknown::OfTouch(k, (*made)?)))
             .collect();
-        all.extend((self.drift > 0.0).then_some(Unknown::Drift(self.drift * unit)));
+        all.extend((self.drift > 0.0).then_some(TouchUnknown::Drift(self.drift * unit)));
         all
     }
 }
 
 /// What each unknown of each press really is: unknowns × presses.
-pub(super) fn made(unknowns: &[Unknown], presses: usize, seed: u64) -> Vec<f32> {
+pub(super) fn made(unknowns: &[TouchUnknown], presses: usize, seed: u64) -> Vec<f32> {
     let drawn = draws(unknowns.len(), presses, seed.wrapping_add(MADE_SEED));
     let scaled = drawn.chunks_exact(presses.max(1)).zip(unknowns);
     scaled
@@ -81,16 +81,16 @@ mod tests {
 
     #[test]
     fn what_is_allowed_for_and_does_not_come_is_to_be_found_and_is_nothing() {
-        let shared = Shared {
+        let shared = SharedUnknowns {
             felt: &|_, _| [1.0; NUISANCES],
             nuisances: [None, Some(0.0), Some(0.5)],
             drift: 3.0,
         };
         let unknowns = shared.unknowns(2.0);
         let wanted = [
-            Unknown::OfTouch(1, 0.0),
-            Unknown::OfTouch(2, 0.5),
-            Unknown::Drift(6.0),
+            TouchUnknown::OfTouch(1, 0.0),
+            TouchUnknown::OfTouch(2, 0.5),
+            TouchUnknown::Drift(6.0),
         ];
         assert_eq!(unknowns, wanted);
         let made = made(&unknowns, 4000, 7);
