@@ -118,6 +118,7 @@ fn shin(text: &mut String, _quick: bool) {
             box_axis: None,
             vertices: None,
             normal: Axis::Z,
+            bedding_n_per_mm3: None,
         });
     }
     project.sites.spacing_mm = 4.0;

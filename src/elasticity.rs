@@ -4,6 +4,7 @@
 //! discrete Kirchhoff–Mindlin triangle (Katili 1993). Assembled once, factored once, all loads solved
 //! in blocks.
 
+pub mod bedding;
 pub mod bending;
 mod both;
 pub mod element;

@@ -30,7 +30,7 @@ use crate::mesh::SurfacePoint;
 use crate::uncertainty::{HandPressing, Uncertainty};
 
 use asked::AskedPresses;
-use part::{FittedPart, PartArg};
+use part::{FittedBedding, FittedPart, PartArg};
 use summary::{FoundOfPart, PressRow, Summary};
 
 /// A calibration needs as many presses at least.
@@ -140,12 +140,14 @@ fn fit_all(
     let before = used(&rows);
     let mut part = part.fitted(&args.fit, common, &rows, noise, off)?;
     let mut found = fit((&part.sensing, &part.loaded), rows, (noise, off), args)?;
-    if part.thickness.is_some() && used(&found.rows) < before {
+    let is_fitted = part.thickness.is_some() || part.bedding.is_some();
+    if is_fitted && used(&found.rows) < before {
         part = part.fitted(&args.fit, common, &found.rows, noise, off)?;
         let model = (&part.sensing, &part.loaded);
         found = fit(model, found.rows, (noise, off), args)?;
     }
     found.of_part.thickness_mm = part.thickness;
+    found.of_part.bedding = part.bedding;
     part::take_stiffness(&args.fit, &part.loaded.inputs.project, &mut found)?;
     Ok((part, found))
 }
@@ -315,6 +317,11 @@ fn save(loaded: &LoadedProject, target: &Path, found: &Summary) -> anyhow::Resul
     let mut project = fresh.map_or_else(|| loaded.inputs.project.clone(), |l| l.inputs.project);
     if let Some([thickness, _]) = found.of_part.thickness_mm {
         project.part.thickness_mm = thickness;
+    }
+    match found.of_part.bedding {
+        Some(FittedBedding::Gives([bedding, _])) => part::hold_by(&mut project, Some(bedding)),
+        Some(FittedBedding::Firm) => part::hold_by(&mut project, None),
+        None => {}
     }
     if let Some([modulus, _]) = found.of_part.youngs_modulus_gpa {
         project.material.youngs_modulus_gpa = modulus;

@@ -43,6 +43,21 @@ pub struct DesignArgs {
     pub sheet: SheetSize,
 }
 
+impl DesignArgs {
+    /// What is asked for on the command line goes before what the project says.
+    fn change(&self, project: &mut Project) {
+        if let Some(sensors) = self.sensors {
+            project.selection.sensors = sensors;
+        }
+        if let Some(selector) = self.selector {
+            project.selection.selector = selector.into();
+        }
+        if self.candidates.is_some() {
+            project.candidates.count = self.candidates;
+        }
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -50,15 +65,7 @@ pub struct DesignArgs {
 pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     let mut loaded = args.common.load()?;
     let project = &mut loaded.inputs.project;
-    if let Some(sensors) = args.sensors {
-        project.selection.sensors = sensors;
-    }
-    if let Some(selector) = args.selector {
-        project.selection.selector = selector.into();
-    }
-    if args.candidates.is_some() {
-        project.candidates.count = args.candidates;
-    }
+    args.change(project);
     let paper = args.paper.then(|| as_in_the_paper(project));
     project.check()?;
     let existed = args.out.exists();

@@ -132,6 +132,7 @@ impl DocumentState {
             box_axis: None,
             vertices: Some(name),
             normal: Axis::Z,
+            bedding_n_per_mm3: None,
         });
     }
 

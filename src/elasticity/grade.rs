@@ -207,7 +207,11 @@ impl ShellGround {
     /// # Errors
     /// [`ElasticError`] for what cannot be computed.
     pub fn model(&self, remeshed: &Remeshed, watch: Watch) -> Result<ShellModel, ElasticError> {
-        ShellModel::new(&remeshed.mesh, self.section, &self.held(remeshed), watch)
+        let firm: Vec<DofSet> = (remeshed.places.iter())
+            .map(|&at| self.held.held_firmly_at(at))
+            .collect();
+        let springs = (self.held).springs(&remeshed.mesh, &remeshed.places, self.section.thickness);
+        ShellModel::on_springs(&remeshed.mesh, self.section, &firm, springs, watch)
     }
 
     /// Lays elements for these touches, finer where their strain changes, until the error is small

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::DofSet;
+use super::bedding::VertexSprings;
 use super::element::Facet;
 use super::error::{ElasticError, range};
 use super::load::{NodalForces, Push, Touch, nodal_forces, pushed};
@@ -23,6 +24,7 @@ pub struct ShellModel {
     /// Material and thickness.
     pub section: ShellSection,
     system: System,
+    springs: Vec<VertexSprings>,
 }
 
 impl ShellModel {
@@ -36,13 +38,28 @@ impl ShellModel {
         held: &[DofSet],
         watch: Watch,
     ) -> Result<Self, ElasticError> {
+        Self::on_springs(mesh, section, held, Vec::new(), watch)
+    }
+
+    /// As [`Self::new`], on springs beside what is held.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn on_springs(
+        mesh: &Arc<TriMesh>,
+        section: ShellSection,
+        held: &[DofSet],
+        springs: Vec<VertexSprings>,
+        watch: Watch,
+    ) -> Result<Self, ElasticError> {
         check_section(&section)?;
-        check_held(mesh, held)?;
+        check_held(mesh, &with_springs(held, &springs))?;
         check_areas(mesh)?;
         report(watch, "Assembling", 0, 1)?;
         let unknowns = number_unknowns(held.iter().flat_map(|h| (0..6).map(|i| h.holds(i))));
         let mut stiffness = pattern(mesh, &unknowns);
         assemble(mesh, &section, &unknowns, &mut stiffness);
+        stiffen(&springs, &unknowns, &mut stiffness);
         report(watch, "Factoring", 0, 1)?;
         let factored = System::new(unknowns.clone(), stiffness, None, watch);
         let system = factored.map_err(|e| explain(mesh, &unknowns, e))?;
@@ -50,6 +67,7 @@ impl ShellModel {
             mesh: Arc::clone(mesh),
             section,
             system,
+            springs,
         })
     }
 
@@ -93,6 +111,11 @@ impl ShellModel {
                 }
             }
         }
+        for (dof, k) in self.sprung() {
+            for (internal, displacement) in internal.iter_mut().zip(solutions) {
+                internal[dof] += k * displacement[dof];
+            }
+        }
         let mut worst = LoadCheck {
             reaction_error: 0.0,
             energy_error: 0.0,
@@ -103,6 +126,16 @@ impl ShellModel {
             worst.energy_error = worst.energy_error.max(check.energy_error);
         }
         worst
+    }
+
+    /// Degrees of freedom that are free, on a spring (N/m, N·m/rad).
+    fn sprung(&self) -> impl Iterator<Item = (usize, f64)> {
+        let of_vertex = |s: &VertexSprings| {
+            let (first, stiffness) = (6 * s.vertex as usize, s.stiffness);
+            (0..6).map(move |i| (first + i, stiffness[i]))
+        };
+        let all = self.springs.iter().flat_map(of_vertex);
+        all.filter(|&(dof, k)| k > 0.0 && !self.system.is_held(dof))
     }
 
     fn balance(&self, forces: &NodalForces, displacement: &[f64], internal: &[f64]) -> LoadCheck {
@@ -117,6 +150,9 @@ impl ShellModel {
             if self.system.is_held(dof) && dof % 6 < 3 {
                 reaction[dof % 6] += force;
             }
+        }
+        for (dof, k) in self.sprung().filter(|(dof, _)| dof % 6 < 3) {
+            reaction[dof % 6] -= k * displacement[dof];
         }
         let load: DVec3 = forces.iter().map(|f| f.1).sum();
         let twice_energy: f64 = internal.iter().zip(displacement).map(|(f, u)| f * u).sum();
@@ -161,7 +197,11 @@ impl Model for ShellModel {
 
     fn held(&self) -> Vec<bool> {
         let any = |v| (0..6).any(|i| self.system.is_held(6 * v + i));
-        (0..self.mesh.positions().len()).map(any).collect()
+        let mut held: Vec<bool> = (0..self.mesh.positions().len()).map(any).collect();
+        for springs in &self.springs {
+            held[springs.vertex as usize] = true;
+        }
+        held
     }
 
     fn pieces(&self) -> usize {
@@ -256,6 +296,29 @@ pub fn check_held(mesh: &TriMesh, held: &[DofSet]) -> Result<(), ElasticError> {
         }
     }
     Ok(())
+}
+
+/// What is held at every vertex, by springs too.
+fn with_springs(held: &[DofSet], springs: &[VertexSprings]) -> Vec<DofSet> {
+    let mut held = held.to_vec();
+    for spring in springs {
+        let sprung = (0..6).filter(|&i| spring.stiffness[i] > 0.0);
+        let sprung: Vec<usize> = sprung.collect();
+        held[spring.vertex as usize].0 |= DofSet::of(&sprung).0;
+    }
+    held
+}
+
+/// Adds springs to a stiffness.
+fn stiffen(springs: &[VertexSprings], unknowns: &[u32], into: &mut SymmetricMatrix) {
+    for spring in springs {
+        for (i, &k) in spring.stiffness.iter().enumerate() {
+            let unknown = unknowns[6 * spring.vertex as usize + i];
+            if unknown != HELD && k > 0.0 {
+                into.add(unknown as usize, unknown as usize, k);
+            }
+        }
+    }
 }
 
 /// Σ over held degrees of freedom of the outer product of what the six rigid motions do there.

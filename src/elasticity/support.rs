@@ -57,6 +57,8 @@ pub struct Support {
     pub region: HeldRegion,
     /// What.
     pub held: DofSet,
+    /// Of a support that gives way: the traction that it takes to move its surface (Pa/m). Nothing moves one without.
+    pub bedding: Option<f64>,
 }
 
 impl Support {
@@ -67,10 +69,7 @@ impl Support {
             HeldRegion::Box(held) => HeldRegion::Box(*held),
             HeldRegion::Vertices(mask) => HeldRegion::Vertices(Arc::new(part.in_order(mask))),
         };
-        Self {
-            region,
-            held: self.held,
-        }
+        Self { region, ..*self }
     }
 
     /// The same support of the part in its canonical form.
@@ -80,10 +79,7 @@ impl Support {
             HeldRegion::Box(held) => HeldRegion::Box(part.frame.snapped_box(held)),
             HeldRegion::Vertices(mask) => HeldRegion::Vertices(Arc::new(part.in_order(mask))),
         };
-        Self {
-            region,
-            held: self.held,
-        }
+        Self { region, ..*self }
     }
 }
 
@@ -96,10 +92,7 @@ pub fn geometry(part: &Arc<TriMesh>, supports: &[Support]) -> (Arc<TriMesh>, Vec
             HeldRegion::Box(held) => HeldRegion::Box(*held),
             HeldRegion::Vertices(mask) => HeldRegion::Vertices(Arc::new(part.given_mask(mask)?)),
         };
-        Some(Support {
-            region,
-            held: support.held,
-        })
+        Some(Support { region, ..*support })
     };
     match supports.iter().map(given).collect() {
         Some(supports) => (Arc::clone(part.as_given()), supports),
@@ -123,6 +116,8 @@ pub struct HeldPart {
     /// when all of them belong to that very one.
     members: Vec<SupportBits>,
     kinds: Vec<DofSet>,
+    /// See [`Support::bedding`], of each support.
+    bedding: Vec<Option<f64>>,
 }
 
 impl HeldPart {
@@ -165,6 +160,7 @@ impl HeldPart {
             mesh,
             members,
             kinds,
+            bedding: supports.iter().map(|s| s.bedding).collect(),
         }
     }
 
@@ -172,15 +168,42 @@ impl HeldPart {
     /// belong to.
     #[must_use]
     pub fn held_at(&self, at: SurfacePoint) -> DofSet {
+        together(self.members_at(at), &self.kinds)
+    }
+
+    /// What is held there by supports that do not give way.
+    #[must_use]
+    pub fn held_firmly_at(&self, at: SurfacePoint) -> DofSet {
+        let firm = |(k, bedding): (usize, &Option<f64>)| match bedding {
+            None => 1 << k,
+            Some(_) => 0,
+        };
+        let firm = self.bedding.iter().enumerate().map(firm);
+        let firm: SupportBits = firm.fold(0, |all, bit| all | bit);
+        together(self.members_at(at) & firm, &self.kinds)
+    }
+
+    /// Supports that give way: their number, what they hold, and their bedding (Pa/m).
+    pub fn beds(&self) -> impl Iterator<Item = (usize, DofSet, f64)> {
+        let beds = self.bedding.iter().zip(&self.kinds).enumerate();
+        beds.filter_map(|(k, (bedding, &held))| Some((k, held, (*bedding)?)))
+    }
+
+    /// Whether a point of the (cut) part belongs to a support, by its number.
+    #[must_use]
+    pub fn belongs(&self, at: SurfacePoint, support: usize) -> bool {
+        self.members_at(at) >> support & 1 == 1
+    }
+
+    /// The supports that all the corners belong to that a point lies between.
+    fn members_at(&self, at: SurfacePoint) -> SupportBits {
         let tri = self.mesh.triangles()[at.triangle as usize];
-        let common = tri
-            .into_iter()
+        tri.into_iter()
             .zip(at.barycentric)
             .filter(|(_, w)| *w > 1e-7)
             .fold(SupportBits::MAX, |all, (v, _)| {
                 all & self.members[v as usize]
-            });
-        together(common, &self.kinds)
+            })
     }
 
     /// Whether a facet of the (cut) part belongs to a support, by its number.
@@ -334,6 +357,7 @@ mod tests {
                 DVec3::new(1.3, 2.0, 1.0),
             )),
             held: DofSet::ALL,
+            bedding: None,
         };
         let part = HeldPart::new(&strip(), &[support]);
         let held: f64 = (0..part.mesh.triangles().len() as u32)
@@ -372,6 +396,7 @@ mod tests {
                 DVec3::new(to, 2.0, 1.0),
             )),
             held: DofSet::ALL,
+            bedding: None,
         };
         let held = HeldPart::new(&part, &[clamp(-1.0, 1.0), clamp(9.0, 11.0)]);
         let area: f64 = (0..held.mesh.triangles().len() as u32)
@@ -405,6 +430,7 @@ mod tests {
         let support = |mask| Support {
             region: HeldRegion::Vertices(Arc::new(mask)),
             held: DofSet::DISPLACEMENTS,
+            bedding: None,
         };
         let spot = HeldPart::new(&strip(), &[support(mask.clone())]);
         assert!(spot.is_spot(9) && !spot.is_spot(8));

@@ -28,6 +28,7 @@
 //! matrix: never more than before, so that presses that say nothing leave everything as it was.
 
 pub mod judged;
+pub mod likeliest;
 pub mod part;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};

@@ -94,22 +94,27 @@ pub fn scatter(title: &str, [x_label, y_label]: [&str; 2], dots: &[Dot], width: 
     );
     front(&mut svg, dots, &px, &py);
     for dot in dots {
-        let colour = match (dot.on_front, dot.allowed) {
-            (true, _) => PALETTE[1],
-            (false, true) => PALETTE[0],
-            (false, false) => "#b8bec8",
-        };
-        let _ = write!(
-            svg,
-            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{}\" fill=\"{colour}\" fill-opacity=\".8\"><title>{}</title></circle>",
-            px(dot.at[0]),
-            py(dot.at[1]),
-            if dot.on_front { 5 } else { 3 },
-            escape(&dot.words)
-        );
+        mark(&mut svg, dot, &px, &py);
     }
     svg.push_str("</svg>");
     svg
+}
+
+/// One dot, with its words for whoever rests on it.
+fn mark(svg: &mut String, dot: &Dot, px: &dyn Fn(f64) -> f64, py: &dyn Fn(f64) -> f64) {
+    let colour = match (dot.on_front, dot.allowed) {
+        (true, _) => PALETTE[1],
+        (false, true) => PALETTE[0],
+        (false, false) => "#b8bec8",
+    };
+    let _ = write!(
+        svg,
+        "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{}\" fill=\"{colour}\" fill-opacity=\".8\"><title>{}</title></circle>",
+        px(dot.at[0]),
+        py(dot.at[1]),
+        if dot.on_front { 5 } else { 3 },
+        escape(&dot.words)
+    );
 }
 
 /// The front as steps: between two of its points nothing better was found.

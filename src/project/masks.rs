@@ -72,6 +72,7 @@ impl Project {
                 Ok(Support {
                     region: region(s, masks)?,
                     held: held(s),
+                    bedding: s.bedding(),
                 })
             })
             .collect()

@@ -199,10 +199,24 @@ keys! {
         #[serde(default)]
         normal: Axis, "", ValueRange::Words(&["x", "y", "z"]),
             "of a symmetry plane; unused otherwise";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        bedding_n_per_mm3: Option<f64>, "N/mm³", from(1e-6, 1e9),
+            "how stiff what it is held by is: the pressure (N/mm²) that moves its surface by a millimetre (rubber of 1 mm: 5, plastic: 1000); none: it does not give way";
     }
 }
 
 impl SupportKeys {
+    /// See [`crate::elasticity::Support::bedding`] (Pa/m). A mirror plane does not give way.
+    #[must_use]
+    pub fn bedding(&self) -> Option<f64> {
+        /// N/mm³.
+        const UNIT: f64 = 1e9;
+        let of = self
+            .bedding_n_per_mm3
+            .filter(|_| self.kind != SupportKind::Symmetry);
+        of.map(|bedding| bedding * UNIT)
+    }
+
     /// Clamps what lies inside a box.
     #[must_use]
     pub fn clamping(region: &OrientedBox) -> Self {
@@ -212,6 +226,7 @@ impl SupportKeys {
             box_axis: None,
             vertices: None,
             normal: Axis::Z,
+            bedding_n_per_mm3: None,
         };
         keys.set_box(region);
         keys

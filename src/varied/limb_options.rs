@@ -204,6 +204,7 @@ fn clamped(boxes: &[BoxMm]) -> Vec<SupportKeys> {
             box_axis: None,
             vertices: None,
             normal: Axis::default(),
+            bedding_n_per_mm3: None,
         })
         .collect()
 }

@@ -106,6 +106,7 @@ impl Disc {
         Support {
             region: HeldRegion::Vertices(Arc::new(mask.collect())),
             held: DofSet::ALL,
+            bedding: None,
         }
     }
 

@@ -38,6 +38,7 @@ pub fn inputs() -> Inputs {
         box_axis: None,
         vertices: None,
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     Inputs {
         project,

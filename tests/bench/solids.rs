@@ -75,6 +75,7 @@ pub fn clamp(lower: DVec3, upper: DVec3) -> Support {
     Support {
         region: HeldRegion::Box(OrientedBox::of_file(lower, upper)),
         held: DofSet::ALL,
+        bedding: None,
     }
 }
 

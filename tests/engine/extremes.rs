@@ -243,6 +243,7 @@ fn one_triangle_and_a_sliver() {
             box_axis: None,
             vertices: None,
             normal: hapdef::mesh::unroll::Axis::Z,
+            bedding_n_per_mm3: None,
         });
         project.touch.edge_margin_mm = 0.0;
         project.feasible.support_clearance_mm = 0.0;
@@ -351,6 +352,7 @@ fn plate(thickness: f64, nu: f64, sliver: f64) -> (Inputs, f64) {
         box_axis: None,
         vertices: Some("rim".into()),
         normal: hapdef::mesh::unroll::Axis::Z,
+        bedding_n_per_mm3: None,
     });
     let part = TriMesh::new(&p, &t, 0).unwrap().0;
     let rim = part
@@ -576,6 +578,7 @@ fn a_million_triangles_are_taken_in_and_computed_on() {
         box_axis: None,
         vertices: None,
         normal: hapdef::mesh::unroll::Axis::Z,
+        bedding_n_per_mm3: None,
     });
     let inputs = Inputs {
         project,

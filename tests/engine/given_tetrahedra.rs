@@ -40,6 +40,7 @@ fn clamped() -> Inputs {
         box_axis: None,
         vertices: None,
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     inputs
 }

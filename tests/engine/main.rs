@@ -11,6 +11,7 @@ mod hard;
 
 mod analytic;
 mod axis;
+mod bedding;
 mod certificate;
 mod cli;
 mod continuity;

@@ -243,7 +243,7 @@ fn a_finger_that_pushes_aside_is_found_with_its_direction() {
     let mut inputs = coarse::limb();
     inputs.project.selection.sites = gauges::sites();
     let sensing = design::sensing(&inputs, &budget(), &unwatched).unwrap();
-    let touches = sensing.touches(&inputs, 300, 5, false).unwrap();
+    let touches = sensing.touches(&inputs, 1200, 5, false).unwrap();
     let off = Uncertainty {
         gluing: Gluing::EXACT,
         elements: 0.0,

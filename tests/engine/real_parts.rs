@@ -33,6 +33,7 @@ fn real_limbs_become_datasets() {
                 box_axis: None,
                 vertices: None,
                 normal: Axis::Z,
+                bedding_n_per_mm3: None,
             });
         }
         project.touch.count = 120;

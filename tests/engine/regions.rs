@@ -145,6 +145,7 @@ fn a_painted_support_holds_like_the_box_it_covers() {
             box_axis: None,
             vertices: Some(name),
             normal: Axis::Z,
+            bedding_n_per_mm3: None,
         });
     }
     let stiffness = |inputs: &Inputs| {

@@ -273,6 +273,7 @@ fn computed(part: Arc<TriMesh>) {
         box_axis: None,
         vertices: None,
         normal: hapdef::mesh::unroll::Axis::Z,
+        bedding_n_per_mm3: None,
     });
     let inputs = Inputs {
         project,

@@ -133,6 +133,7 @@ fn inputs(written: Written) -> Inputs {
             box_axis: None,
             vertices: None,
             normal: Axis::Z,
+            bedding_n_per_mm3: None,
         });
     }
     Inputs {
@@ -249,6 +250,7 @@ fn lower_hoop(positions: &[DVec3]) -> Support {
     Support {
         region: HeldRegion::Vertices(Arc::new(mask)),
         held: DofSet::ALL,
+        bedding: None,
     }
 }
 
@@ -294,6 +296,7 @@ fn a_solid_answers_the_same_in_any_order() {
         let foot = Support {
             region: HeldRegion::Vertices(Arc::new(mask)),
             held: DofSet::ALL,
+            bedding: None,
         };
         let told = |_: DVec3| None;
         let ground = SolidGround::new(
@@ -329,6 +332,7 @@ fn what_is_not_held_is_told_where_the_part_lies() {
     let beside = Support {
         region: HeldRegion::Box(OrientedBox::of_file(DVec3::ZERO, DVec3::ONE)),
         held: DofSet::ALL,
+        bedding: None,
     };
     let ground = ShellGround::new(&part, SECTION, &[beside], false);
     let Err(ElasticError::NothingHeld { lower, upper }) = ground.check_held() else {

@@ -152,6 +152,7 @@ fn an_open_surface_is_no_solid() {
         box_axis: None,
         vertices: None,
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     let inputs = Inputs {
         project,

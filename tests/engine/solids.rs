@@ -157,6 +157,7 @@ fn mirror(axis: usize) -> Support {
     Support {
         region: HeldRegion::Box(OrientedBox::of_file(lower, upper)),
         held: DofSet::symmetry(axis),
+        bedding: None,
     }
 }
 
@@ -289,6 +290,7 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
             let held = |region| Support {
                 region,
                 held: DofSet::ALL,
+                bedding: None,
             };
             let foot = held(region(DVec3::NEG_ONE, DVec3::new(1.0, 1.0, top)));
             // Another box lies along the file's axes within what the foot holds: cells stand as that one does.
@@ -375,6 +377,7 @@ fn an_edge_and_a_corner_hold_a_solid_too() {
     let held = |mask: &[bool]| Support {
         region: HeldRegion::Vertices(std::sync::Arc::new(mask.to_vec())),
         held: DofSet::DISPLACEMENTS,
+        bedding: None,
     };
     let touch = Touch {
         position: DVec3::new(side, side / 2.0, length / 2.0),

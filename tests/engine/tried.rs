@@ -208,6 +208,7 @@ fn strip() -> Inputs {
         box_axis: None,
         vertices: None,
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     Inputs {
         project,

@@ -172,6 +172,7 @@ fn answer(loaded: LoadedMesh, set: Option<&str>) -> (f64, f64, Vec<String>) {
         box_axis: None,
         vertices: set.map(str::to_owned),
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     let touch = Touch {
         position: DVec3::new(0.09, 0.01, 0.002),

@@ -169,6 +169,7 @@ fn a_plate_of_two_triangles_is_touched_all_over_but_its_margin() {
         box_axis: None,
         vertices: None,
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     project.sites.spacing_mm = 8.0;
     let part = TriMesh::new(&corners, &[[0, 1, 2], [0, 2, 3]], 0)
@@ -347,6 +348,7 @@ fn an_open_solid_that_welding_closes_is_told_the_key() {
             box_axis: None,
             vertices: None,
             normal: Axis::Z,
+            bedding_n_per_mm3: None,
         });
         Inputs {
             project,

@@ -1,9 +1,8 @@
-//! What the presses say of the part beside its gauges: how stiff its material is, and how thick a shell's wall.
+//! What the presses say of the part beside its gauges: how stiff its material is, how thick a shell's wall, and how far
+//! its supports give way.
 //!
 //! Of the material every reading tells alike. Another thickness changes how the wall bends and stretches: each is a model
 //! of its own, and that which makes the presses most likely is taken.
-
-use std::collections::BTreeMap;
 
 use anyhow::Context as _;
 use clap::ValueEnum;
@@ -11,11 +10,12 @@ use clap::ValueEnum;
 use super::summary::{PressRow, Summary};
 use crate::cli::common::Common;
 use crate::cli::progress::Bar;
-use crate::design::{self, Sensing};
+use crate::design::{self, Inputs, Sensing};
 use crate::inference::KnownPress;
+use crate::inference::calibration::likeliest::{LogLattice, likeliest};
 use crate::inference::calibration::part::of_part;
 use crate::io::project_file::LoadedProject;
-use crate::project::{PartModel, Project};
+use crate::project::{PartModel, Project, SupportKind};
 use crate::uncertainty::Uncertainty;
 
 /// What may be fitted of a part.
@@ -25,16 +25,29 @@ pub enum PartArg {
     Stiffness,
     /// The thickness of a shell's wall.
     Thickness,
+    /// How far the supports give way: one bedding for all of them.
+    Supports,
 }
 
 /// The part as it was fitted.
 pub struct FittedPart {
-    /// The project with its wall.
+    /// The project with its wall and supports.
     pub loaded: LoadedProject,
     /// Its model.
     pub sensing: Sensing,
     /// How thick the wall is, and its standard deviation (mm); nothing where that was not asked for.
     pub thickness: Option<[f64; 2]>,
+    /// How stiff the supports are (N/mm³), likewise.
+    pub bedding: Option<FittedBedding>,
+}
+
+/// What presses say of the supports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FittedBedding {
+    /// That they do not give way is as likely as anything else.
+    Firm,
+    /// This bedding, and its standard deviation (N/mm³).
+    Gives([f64; 2]),
 }
 
 /// How far off the stiffness is taken to be where it is to be found (a share, as a standard deviation).
@@ -66,10 +79,11 @@ impl FittedPart {
             loaded,
             sensing,
             thickness: None,
+            bedding: None,
         }
     }
 
-    /// With the wall that the presses speak for, where that is asked for.
+    /// With the supports and the wall that the presses speak for, as far as that is asked for.
     pub fn fitted(
         mut self,
         fit: &[PartArg],
@@ -78,34 +92,122 @@ impl FittedPart {
         noise: &[f64],
         off: &Uncertainty,
     ) -> anyhow::Result<Self> {
-        if !fit.contains(&PartArg::Thickness) {
-            return Ok(self);
-        }
+        let asked = [PartArg::Supports, PartArg::Thickness].map(|of| fit.contains(&of));
         let bar = Bar::default();
-        let watch = |p| bar.show(p);
-        let drawn = self.loaded.inputs.project.part.thickness_mm;
-        let of = |log: f64| {
-            let mut inputs = self.loaded.inputs.clone();
-            inputs.project.part.thickness_mm = drawn * log.exp();
-            let budget = inputs.project.budget.budget();
-            common.in_pool(|| Ok(design::sensing(&inputs, &budget, &watch)?))
+        let trials = Trials {
+            common,
+            rows,
+            noise,
+            off,
+            bar: &bar,
         };
-        // A wall that cannot be computed is not the one that was pressed.
-        let evidence = |log: f64| {
-            let found = of(log)
-                .ok()
-                .and_then(|sensing| of_part(&sensing.drawn, &known(rows, &sensing), noise, off));
-            found.map_or(f64::NEG_INFINITY, |f| f.evidence)
-        };
-        let found = likeliest(evidence).map(|top| of(top.0).map(|sensing| (top, sensing)));
+        // Each is found with the other as it is known by then.
+        let rounds = if asked == [true; 2] { 2 } else { 1 };
+        for _ in 0..rounds {
+            if asked[0] {
+                self = self.with_bedding(&trials)?;
+            }
+            if asked[1] {
+                self = self.with_thickness(&trials)?;
+            }
+        }
         bar.finish();
-        let ((log, deviation), sensing) = found.context(UNSAID)??;
+        Ok(self)
+    }
+
+    fn with_thickness(mut self, trials: &Trials<'_>) -> anyhow::Result<Self> {
+        let drawn = self.loaded.inputs.project.part.thickness_mm;
+        let set = |project: &mut Project, log: f64| project.part.thickness_mm = drawn * log.exp();
+        let lattice = LogLattice::THICKNESS;
+        let (log, deviation) = trials
+            .likeliest(&lattice, &self.loaded.inputs, set)
+            .context(UNSAID)?;
+        set(&mut self.loaded.inputs.project, log);
+        self.sensing = trials.sensing(&self.loaded.inputs)?;
         let thickness = drawn * log.exp();
-        self.loaded.inputs.project.part.thickness_mm = thickness;
-        Ok(Self {
-            loaded: self.loaded,
-            sensing,
-            thickness: Some([thickness, thickness * deviation]),
+        self.thickness = Some([thickness, thickness * deviation]);
+        Ok(self)
+    }
+
+    /// Supports that give way, where that is much likelier than that they do not.
+    fn with_bedding(mut self, trials: &Trials<'_>) -> anyhow::Result<Self> {
+        /// What the logarithm of the evidence has to gain: two deviations.
+        const GAIN: f64 = 2.0;
+        let inputs = &mut self.loaded.inputs;
+        let start = first_bedding(inputs);
+        let set = |project: &mut Project, log: f64| hold_by(project, Some(start * log.exp()));
+        let top = trials.likeliest(&LogLattice::BEDDING, inputs, set);
+        hold_by(&mut inputs.project, None);
+        let holds = trials.evidence(inputs);
+        let gives = top.filter(|top| {
+            let mut given = inputs.clone();
+            set(&mut given.project, top.0);
+            trials.evidence(&given) > holds + GAIN
+        });
+        self.bedding = Some(match gives {
+            Some((log, deviation)) => {
+                set(&mut inputs.project, log);
+                FittedBedding::Gives([1.0, deviation].map(|share| start * log.exp() * share))
+            }
+            None => FittedBedding::Firm,
+        });
+        self.sensing = trials.sensing(&self.loaded.inputs)?;
+        Ok(self)
+    }
+}
+
+/// A bedding (N/mm³) that gives way about as much as the part on it.
+fn first_bedding(inputs: &Inputs) -> f64 {
+    let (lower, upper) = inputs.part.bounds();
+    let size_mm = (upper - lower).length() * 1e3;
+    inputs.project.material.youngs_modulus_gpa * 1e3 / size_mm
+}
+
+/// Gives all supports that can give way this bedding (N/mm³).
+pub fn hold_by(project: &mut Project, bedding: Option<f64>) {
+    let supports = project.supports.iter_mut();
+    for support in supports.filter(|s| s.kind != SupportKind::Symmetry) {
+        support.bedding_n_per_mm3 = bedding;
+    }
+}
+
+/// Parts as they might be, each with a model of its own, and what presses say of them.
+struct Trials<'a> {
+    common: &'a Common,
+    rows: &'a [PressRow],
+    noise: &'a [f64],
+    off: &'a Uncertainty,
+    bar: &'a Bar,
+}
+
+impl Trials<'_> {
+    fn sensing(&self, inputs: &Inputs) -> anyhow::Result<Sensing> {
+        let watch = |p| self.bar.show(p);
+        let budget = inputs.project.budget.budget();
+        self.common
+            .in_pool(|| Ok(design::sensing(inputs, &budget, &watch)?))
+    }
+
+    /// The logarithm of how likely the presses are. A part that cannot be computed is not the one that was pressed.
+    fn evidence(&self, inputs: &Inputs) -> f64 {
+        let found = self.sensing(inputs).ok().and_then(|sensing| {
+            let known = known(self.rows, &sensing);
+            of_part(&sensing.drawn, &known, self.noise, self.off)
+        });
+        found.map_or(f64::NEG_INFINITY, |f| f.evidence)
+    }
+
+    /// What is likeliest of something that `set` gives a project, and its deviation; both as logarithms.
+    fn likeliest(
+        &self,
+        lattice: &LogLattice,
+        inputs: &Inputs,
+        set: impl Fn(&mut Project, f64),
+    ) -> Option<(f64, f64)> {
+        likeliest(lattice, |log| {
+            let mut tried = inputs.clone();
+            set(&mut tried.project, log);
+            self.evidence(&tried)
         })
     }
 }
@@ -123,52 +225,6 @@ fn known(rows: &[PressRow], sensing: &Sensing) -> Vec<KnownPress> {
 
 const UNSAID: &str = "the presses do not say how thick the wall is: press at more places, with a force that is known, or leave thickness out of --fit";
 
-/// Where a function with one top is largest, and the standard deviation that its curvature there stands for; nothing where it
-/// is too flat to say. Away from the top evidence falls ever more slowly, for the model is then trusted less and less:
-/// slopes do not lead there, but the best of five places does, which are laid anew around it, nearer to each other.
-/// Elements are laid anew for every thickness, which makes evidence tremble: places that lie too near each other would say
-/// nothing.
-fn likeliest(evidence: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
-    /// Places lie on a lattice of this (logarithms of the thickness), at first so many steps apart and at last one.
-    const LATTICE: f64 = 0.03;
-    const FIRST: i32 = 4;
-    /// The farthest that the top may lie, in steps, and the largest deviation that says anything.
-    const FARTHEST: i32 = 36;
-    const VAGUE: f64 = 0.15;
-    let mut known = BTreeMap::new();
-    let (mut middle, mut step) = (0_i32, FIRST);
-    while middle.abs() < FARTHEST {
-        let places = [-2, -1, 0, 1, 2].map(|k| middle + k * step);
-        let found = places.map(|at| {
-            let value = || evidence(f64::from(at) * LATTICE);
-            *known.entry(at).or_insert_with(value)
-        });
-        let best = (0..5).max_by(|&a, &b| found[a].total_cmp(&found[b]))?;
-        middle = places[best];
-        if best == 0 || best == 4 {
-            continue;
-        }
-        if step > 1 {
-            step /= 2;
-            continue;
-        }
-        let (off, deviation) = top_of(found)?;
-        let off = off + f64::from(places[2] - middle);
-        let (top, deviation) = (LATTICE * (f64::from(middle) + off), LATTICE * deviation);
-        return (deviation < VAGUE).then_some((top, deviation));
-    }
-    None
-}
-
-/// Where the parabola nearest to five values at even steps has its top, from the midst, and the standard deviation of a
-/// density with that logarithm; both in steps. Nothing where it has none near.
-fn top_of([a, b, c, d, e]: [f64; 5]) -> Option<(f64, f64)> {
-    let slope = (2.0 * (e - a) + (d - b)) / 10.0;
-    let bend = (b + d + 2.0 * c - 2.0 * (a + e)) / 7.0;
-    let top = slope / bend;
-    (bend > 0.0 && top.abs() <= 2.0).then(|| (top, bend.recip().sqrt()))
-}
-
 /// Takes the factor that all gauges share for the material's.
 pub fn take_stiffness(
     fit: &[PartArg],
@@ -185,26 +241,4 @@ pub fn take_stiffness(
     found.of_part.youngs_modulus_gpa = Some([modulus, modulus * deviation / factor]);
     found.calibration = found.calibration.clone().on_softer(factor);
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_top_is_found_wherever_it_lies_and_however_the_values_tremble() {
-        for top in [-0.7, 0.02, 0.17, 0.4] {
-            let tremble = |x: f64| 0.02 * (1e4 * x).sin();
-            // As it falls where the model is trusted less and less.
-            let value = |x: f64| -80.0 * (1.0 + ((x - top) / 0.1).powi(2)).ln() + tremble(x);
-            let (found, said) = likeliest(value).unwrap();
-            assert!((found - top).abs() < 5e-3, "{found} for {top}");
-            let right = 0.1 / 160.0_f64.sqrt();
-            assert!((0.8..1.8).contains(&(said / right)), "{said} for {right}");
-        }
-        // What is flat, has no top or is no number says nothing.
-        let flat = |x: f64| -2.0 * x * x;
-        assert!(likeliest(flat).is_none() && likeliest(|x| x * x).is_none());
-        assert!(likeliest(|_| f64::NAN).is_none() && likeliest(|_| f64::NEG_INFINITY).is_none());
-    }
 }

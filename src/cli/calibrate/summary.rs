@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde_json::{Value, json};
 
+use super::part::FittedBedding;
 use crate::cli::out;
 use crate::design::Sensing;
 use crate::inference::calibration::judged::PressOutlook;
@@ -54,6 +55,7 @@ pub struct FoundOfPart {
     pub factor: Option<[f64; 2]>,
     pub youngs_modulus_gpa: Option<[f64; 2]>,
     pub thickness_mm: Option<[f64; 2]>,
+    pub bedding: Option<FittedBedding>,
 }
 
 /// What was found.
@@ -93,6 +95,11 @@ impl Summary {
                 "next_mm": next,
                 "youngs_modulus_gpa": self.of_part.youngs_modulus_gpa.map(with_deviation),
                 "thickness_mm": self.of_part.thickness_mm.map(with_deviation),
+                "bedding_n_per_mm3": match self.of_part.bedding {
+                    Some(FittedBedding::Gives(found)) => with_deviation(found),
+                    Some(FittedBedding::Firm) => json!("firm"),
+                    None => Value::Null,
+                },
             });
             return out::line(&summary.to_string());
         }
@@ -118,11 +125,22 @@ impl Summary {
         for (what, found, unit) in [
             ("Young's modulus", self.of_part.youngs_modulus_gpa, "GPa"),
             ("the wall's thickness", self.of_part.thickness_mm, "mm"),
+            (
+                "the supports' bedding",
+                match self.of_part.bedding {
+                    Some(FittedBedding::Gives(found)) => Some(found),
+                    _ => None,
+                },
+                "N/mm³",
+            ),
         ] {
             if let Some([value, deviation]) = found {
                 let (value, deviation) = (digits(value), digits(deviation));
                 out::line(&format!("{what}: {value} ± {deviation} {unit}"))?;
             }
+        }
+        if self.of_part.bedding == Some(FittedBedding::Firm) {
+            out::line("the supports hold: that they give way is no likelier")?;
         }
         out::line(&format!("saved in {}", target.display()))
     }

@@ -42,6 +42,12 @@ const RULE: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
 /// A line is held at the points of this rule (Gauss, two points) on each of its pieces, likewise.
 const LINE: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
+/// Of springs (Pa/m) that hold as if nothing gave way, beside elements of a size (m).
+#[must_use]
+pub fn firm(material: &Material, size: f64) -> f64 {
+    STIFF * material.youngs_modulus / size
+}
+
 impl Grip {
     /// Nothing held yet.
     #[must_use]
@@ -81,14 +87,14 @@ impl Grip {
         any
     }
 
-    /// Holds a facet of a surface with springs. `size` (m) is that of an element.
+    /// Holds a facet of a surface with springs of so much an area (Pa/m). `size` (m) is that of an element.
     pub fn hold_facet(
         &mut self,
         elements: &dyn Elements,
         mesh: &TriMesh,
         facet: u32,
         held: DofSet,
-        material: &Material,
+        bedding: f64,
         size: f64,
     ) {
         let longest = mesh.longest_side(facet);
@@ -104,7 +110,7 @@ impl Grip {
                         (0..3).map(|k| weights[k] * piece[k][i]).sum()
                     }),
                 };
-                let stiffness = STIFF * material.youngs_modulus / size * area;
+                let stiffness = bedding * area;
                 self.hold_point(elements, mesh.point(at), normal, held, stiffness);
             }
         }
@@ -158,7 +164,7 @@ impl Grip {
         material: &Material,
         size: f64,
     ) {
-        let stiffness = STIFF * material.youngs_modulus / size * area;
+        let stiffness = firm(material, size) * area;
         self.hold_point(elements, point, normal, held, stiffness);
     }
 

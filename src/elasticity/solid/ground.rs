@@ -73,6 +73,17 @@ pub struct SolidGround {
 const VERTICES: usize = 9000;
 /// Of the distances between touches and what is held, this share may be left unresolved.
 const NEAREST: f64 = 0.1;
+/// The facets whose side is declared, by their middles.
+fn declared_sides(
+    mesh: &TriMesh,
+    declared: &dyn Fn(DVec3) -> Option<WallSide>,
+) -> impl Iterator<Item = (u32, WallSide)> {
+    (0..mesh.triangles().len() as u32).filter_map(move |t| {
+        let middle = mesh.corners(t).iter().sum::<DVec3>() / 3.0;
+        Some((t, declared(middle)?))
+    })
+}
+
 impl SolidGround {
     /// Tells the faces of a part apart that fingertips touch; `declared` says what the user has said of a place.
     ///
@@ -113,12 +124,9 @@ impl SolidGround {
         let mut walls = Walls::of(&whole, watch)?;
         let mounts = held.mounts(supports.len());
         let mut reach = Reach::of(&whole, &walls, fingertip, &mounts, watch)?;
-        for t in 0..whole.triangles().len() as u32 {
-            let middle = whole.corners(t).iter().sum::<DVec3>() / 3.0;
-            if let Some(side) = declared(middle) {
-                walls.sides[t as usize] = side;
-                reach.tell(t, side);
-            }
+        for (t, side) in declared_sides(&whole, declared) {
+            walls.sides[t as usize] = side;
+            reach.tell(t, side);
         }
         let inward: Vec<bool> = walls.sides.iter().map(|&s| s == WallSide::Inside).collect();
         let (inside, vertices) = whole

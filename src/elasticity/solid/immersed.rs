@@ -8,7 +8,7 @@ use super::cells::FiniteCells;
 use super::cut::Cutting;
 use super::dissection::Dissection;
 use super::grid::CellGrid;
-use super::grip::Grip;
+use super::grip::{self, Grip};
 use super::piece::TetrahedraPiece;
 use super::tetrahedra::OrderedTetrahedra;
 use super::{Elements, SolidModel};
@@ -262,9 +262,11 @@ impl Immersed {
     /// hold an edge, or three corners.
     fn spring(&self, grip: &mut Grip, on: &dyn Elements, number: usize, held: DofSet, size: f64) {
         let mesh = &self.held.mesh;
+        let firm = grip::firm(&self.material, size);
+        let bedding = self.supports[number].bedding.unwrap_or(firm);
         for facet in 0..mesh.triangles().len() as u32 {
             if self.held.facet_belongs(facet, number) {
-                grip.hold_facet(on, mesh, facet, held, &self.material, size);
+                grip.hold_facet(on, mesh, facet, held, bedding, size);
             }
         }
         for edge in self.held.lines_of(number) {
@@ -300,7 +302,14 @@ impl Immersed {
             let in_border = || lies_in(facet, lower) || lies_in(facet, upper);
             if self.held.facet_belongs(facet, number) && in_border() {
                 let held = displacements(&self.supports[number]);
-                grip.hold_facet(on, mesh, facet, held, &self.material, size);
+                grip.hold_facet(
+                    on,
+                    mesh,
+                    facet,
+                    held,
+                    grip::firm(&self.material, size),
+                    size,
+                );
             }
         }
     }
@@ -321,7 +330,7 @@ impl Immersed {
         let mut grip = Grip::new(cells);
         for (number, support) in self.supports.iter().enumerate() {
             let held = displacements(support);
-            let is_volume = held == DofSet::DISPLACEMENTS && {
+            let is_volume = support.bedding.is_none() && held == DofSet::DISPLACEMENTS && {
                 let planes = along_planes(support, cells.stance());
                 let inside = |p: DVec3| match planes {
                     Some((lower, upper))
@@ -342,7 +351,9 @@ impl Immersed {
                 continue;
             }
             self.spring(&mut grip, cells, number, held, size);
-            if let (HeldRegion::Box(region), DofSet::DISPLACEMENTS) = (&support.region, held) {
+            if let (HeldRegion::Box(region), DofSet::DISPLACEMENTS, None) =
+                (&support.region, held, support.bedding)
+            {
                 self.spring_across(&mut grip, cells, region, size);
             }
         }
@@ -377,14 +388,14 @@ fn along_planes(support: &Support, stance: Stance) -> Option<(DVec3, DVec3)> {
     }
 }
 
-/// Holds the nodes in a support's box; whether there are any.
+/// Holds the nodes in a support's box; whether there are any. What gives way is held by its surface alone.
 fn hold_box(
     grip: &mut Grip,
     elements: &OrderedTetrahedra,
     support: &Support,
     fineness: &Fineness,
 ) -> bool {
-    let HeldRegion::Box(held) = support.region else {
+    let (HeldRegion::Box(held), None) = (&support.region, support.bedding) else {
         return false;
     };
     let slack = 1e-9 * fineness.size;

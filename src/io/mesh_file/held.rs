@@ -90,6 +90,7 @@ impl HeldNodes {
                 box_axis: None,
                 vertices: Some(name_of(self.held(way.need), way.name, sets)),
                 normal: way.normal,
+                bedding_n_per_mm3: None,
             })
         });
         let supports = supports.collect();

@@ -15,6 +15,7 @@ fn full() -> Project {
         box_axis: Some([0.1, -2.0, 1.0 / 3.0]),
         vertices: None,
         normal: Axis::X,
+        bedding_n_per_mm3: None,
     });
     p.supports.push(SupportKeys {
         kind: SupportKind::Pinned,
@@ -22,6 +23,7 @@ fn full() -> Project {
         box_axis: None,
         vertices: Some("rim \"left\"".into()),
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     p.part.axis = PartAxis::Along([0.1, 1.0 / 3.0, -2.0]);
     p.candidates.count = Some(407);
@@ -217,6 +219,7 @@ fn numbered(folder: &Path, number: u8) -> (Project, Vec<bool>, Masks) {
         box_axis: None,
         vertices: Some("support-1".into()),
         normal: Axis::Z,
+        bedding_n_per_mm3: None,
     });
     let masks = [("keep-out", mask(1)), ("support-1", mask(2))];
     let masks = masks.map(|(name, mask)| (name.to_owned(), Arc::new(mask)));

@@ -72,6 +72,9 @@ fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> Oriented
             kind_name,
             &SupportKeys::kind().sentence(),
         );
+        if support.kind != SupportKind::Symmetry {
+            bedding(ui, &label, &mut support.bedding_n_per_mm3);
+        }
         if let Some(name) = &support.vertices {
             ui.label("Vertices");
             ui.label(name);
@@ -105,6 +108,27 @@ fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> Oriented
         project.supports.push(SupportKeys::clamping(&held));
     }
     ui.end_row();
+}
+
+/// Whether a support gives way, and how stiff it is then.
+fn bedding(ui: &mut Ui, support: &str, bedding: &mut Option<f64>) {
+    /// What somebody begins with (N/mm³): hard rubber.
+    const START: f64 = 50.0;
+    let key = SupportKeys::bedding_n_per_mm3();
+    let mut gives = bedding.is_some();
+    let name = ui.label("Gives way");
+    let toggled = ui
+        .checkbox(&mut gives, "")
+        .on_hover_text(key.sentence())
+        .labelled_by(name.id)
+        .accessible_name(format!("{support} gives way"));
+    ui.end_row();
+    if toggled.changed() {
+        *bedding = gives.then_some(START);
+    }
+    if let Some(bedding) = bedding {
+        number(ui, "Bedding", bedding, key, 1.0);
+    }
 }
 
 fn kind_name(kind: SupportKind) -> &'static str {

@@ -227,6 +227,7 @@ mod tests {
                 DVec3::new(1.0, 1.0, 1e-6),
             )),
             held: DofSet::ALL,
+            bedding: None,
         };
         let material = Material {
             youngs_modulus: 2e9,
