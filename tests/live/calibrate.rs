@@ -162,16 +162,15 @@ fn presses_by_hand_show_how_gauges_are_glued() {
     );
 }
 
-/// A limb that was printed thicker, or of softer nylon, than its project says.
+/// A limb that was printed thicker, of softer nylon or on softer feet than its project says.
 #[test]
-fn presses_say_how_stiff_and_how_thick_the_part_is() {
+fn presses_say_how_stiff_and_how_thick_the_part_is_and_how_it_is_held() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     hapdef(&["limb", "--out", folder.path().to_str().unwrap()]).unwrap();
     let drawn = std::fs::read_to_string(at("limb.hapdef.toml")).unwrap();
     script(&at("known.csv"), &places(16, 0.0), 10.0);
     let fitted = |name: &str, made: &str, fit: &str| -> Value {
-        assert_ne!(made, drawn);
         let printed = at(&format!("{name}.hapdef.toml"));
         std::fs::write(&printed, made).unwrap();
         let recording = at(&format!("{name}.hapdrec"));
@@ -231,4 +230,14 @@ fn presses_say_how_stiff_and_how_thick_the_part_is() {
     let gains = saved("gain");
     let gain = gains.iter().sum::<f64>() / gains.len() as f64;
     assert!(gains.len() == 10 && (gain - 1.0).abs() < 0.03, "{gains:?}");
+
+    // Feet on rubber.
+    let loose = drawn.replace("[[support]]\n", "[[support]]\nbedding_n_per_mm3 = 3.0\n");
+    let found = fitted("loose", &loose, "supports");
+    let bedding = within(&found["bedding_n_per_mm3"], 3.0, 0.2);
+    assert_eq!(saved("bedding_n_per_mm3"), [bedding; 4]);
+    // The same feet, screwed to steel.
+    let found = fitted("firm", &drawn, "supports");
+    assert_eq!(found["bedding_n_per_mm3"], "firm");
+    assert_eq!(saved("bedding_n_per_mm3"), [0.0; 0]);
 }
