@@ -30,8 +30,8 @@ use crate::mesh::SurfacePoint;
 use crate::uncertainty::{HandPressing, Uncertainty};
 
 use asked::AskedPresses;
-use part::{FittedBedding, FittedPart, PartArg};
-use summary::{FoundOfPart, PressRow, Summary};
+use part::{FittedPart, PartArg};
+use summary::{FittedBedding, FoundOfPart, PressRow, Summary};
 
 /// A calibration needs as many presses at least.
 const LEAST: usize = 4;
@@ -326,9 +326,9 @@ fn save(loaded: &LoadedProject, target: &Path, found: &Summary) -> anyhow::Resul
     if let Some([modulus, _]) = found.of_part.youngs_modulus_gpa {
         project.material.youngs_modulus_gpa = modulus;
     }
-    project
-        .live
-        .take(&found.calibration, &loaded.inputs.project.selection.sites);
+    let presses = found.rows.iter().filter_map(PressRow::keys);
+    let sites = &loaded.inputs.project.selection.sites;
+    (project.live).take(&found.calibration, sites, presses.collect());
     let folder = target.parent().unwrap_or(Path::new("."));
     let mesh = if loaded.bundled {
         crate::io::examples::write_bundled_mesh(folder, &loaded.mesh_path)?

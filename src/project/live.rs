@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::key::{ValueRange, above, from};
 use super::keys::keys;
+use super::press::PressKeys;
 use super::ranges::{FRICTION, PLACES};
 use super::selection::ChosenSite;
 use super::value::BadValue;
@@ -40,6 +41,9 @@ keys! {
         /// How the gauges were found to be glued, one each, by known touches.
         #[serde(rename = "glued", skip_serializing_if = "Vec::is_empty")]
         glued: Vec<GluedKeys> = Vec::new();
+        /// The known touches that say so.
+        #[serde(rename = "press", skip_serializing_if = "Vec::is_empty")]
+        presses: Vec<PressKeys> = Vec::new();
     }
 }
 
@@ -101,8 +105,13 @@ fn numbers(site: &ChosenSite) -> [f64; 6] {
 }
 
 impl LiveKeys {
-    /// Takes over what known touches have shown of the gauges at these sites.
-    pub fn take(&mut self, calibration: &Calibration, sites: &[ChosenSite]) {
+    /// Takes over what known touches have shown of the gauges at these sites, and the touches.
+    pub fn take(
+        &mut self,
+        calibration: &Calibration,
+        sites: &[ChosenSite],
+        presses: Vec<PressKeys>,
+    ) {
         let keys = |((glued, doubt), site): ((&AsGlued, &GluingCovariance), &ChosenSite)| {
             let AsGlued {
                 gain,
@@ -122,6 +131,7 @@ impl LiveKeys {
         let glued = calibration.glued.iter().zip(&calibration.doubts);
         self.glued = glued.zip(sites).map(keys).collect();
         self.model_error = calibration.relative;
+        self.presses = presses;
     }
 
     /// What the model is off by for gauges anywhere (share of a reading): what somebody has said. What a calibration found
@@ -138,7 +148,18 @@ impl LiveKeys {
     /// Forgets it.
     pub fn forget(&mut self) {
         self.glued.clear();
+        self.presses.clear();
         self.model_error = Self::default().model_error;
+    }
+
+    /// The known touches of the gauges at these very sites.
+    #[must_use]
+    pub fn presses_of(&self, sites: &[ChosenSite]) -> &[PressKeys] {
+        if self.is_of(sites) {
+            &self.presses
+        } else {
+            &[]
+        }
     }
 
     /// How each gauge is glued; nothing without a calibration of the gauges at these very sites.
@@ -194,6 +215,14 @@ impl LiveKeys {
                     value: format!("{count} for {gauges} gauges"),
                 });
             }
+        }
+        let reads = |press: &PressKeys| press.reading_microstrain.len() == gauges;
+        if let Some(press) = self.presses.iter().find(|press| !reads(press)) {
+            return Err(BadValue {
+                key: "live.press.reading_microstrain".to_owned(),
+                rule: "one reading for each chosen gauge".into(),
+                value: format!("{} for {gauges} gauges", press.reading_microstrain.len()),
+            });
         }
         let pairs = self.glued.iter().zip(sites);
         let other = pairs

@@ -4,8 +4,8 @@ use super::keys::KeyTable;
 use super::{
     BadValue, BudgetKeys, CalibrationKeys, CandidateKeys, ChosenSite, CostKeys, EvaluationKeys,
     FeasibleKeys, GaugeKeys, GaussianProcessKeys, GluedKeys, KeptError, KeptFailure, KeptSelection,
-    Key, LiveKeys, MaterialKeys, Part, Project, RegionKeys, SelectionKeys, SiteKeys, SupportKeys,
-    ToleranceKeys, TouchKeys,
+    Key, LiveKeys, MaterialKeys, Part, PressKeys, Project, RegionKeys, SelectionKeys, SiteKeys,
+    SupportKeys, ToleranceKeys, TouchKeys,
 };
 use crate::budget::BudgetLimits;
 
@@ -53,6 +53,7 @@ impl Project {
         }
         one(see, &self.live);
         list(see, "live.glued", &self.live.glued);
+        list(see, "live.press", &self.live.presses);
         for (k, kept) in self.kept.iter().enumerate() {
             nth(see, "kept", k, kept);
             list(see, "kept.site", &kept.sites);
@@ -117,6 +118,7 @@ pub fn all_keys() -> Vec<&'static Key> {
         BudgetLimits::keys(),
         LiveKeys::keys(),
         GluedKeys::keys(),
+        PressKeys::keys(),
         KeptSelection::keys(),
         KeptError::keys(),
         KeptFailure::keys(),

@@ -140,6 +140,7 @@ impl UnitBase {
                         "selection.cost.",
                         "evaluation.region.",
                         "live.glued.",
+                        "live.press.",
                         "kept.",
                     ];
                     ensure!(

@@ -101,7 +101,7 @@ fn a_stiff_part_moves_as_a_rigid_body_on_springs() {
     let b = BEDDING * 1e9;
     let (area, turning) = (HELD * WIDE, WIDE * HELD.powi(3) / 12.0);
     for model in [PartModel::Shell, PartModel::Solid] {
-        let inputs = part(model, 1e5, Some(BEDDING));
+        let inputs = part(model, 1e6, Some(BEDDING));
         let pressed = 0.07;
         let along = [0.03, 0.09];
         let arm = pressed - HELD / 2.0;

@@ -102,6 +102,24 @@ fn a_simulated_board_from_start_to_replay() {
     unplug(&mut w);
     let seen = record(&mut w, &folder.path().join("touches.hapdrec"));
     replay(&mut w, &folder.path().join("touches.hapdrec"), &seen);
+    recall(&mut w, &folder.path().join("pressed.hapdef.toml"));
+}
+
+/// The known touches lie in the project's file with the board that read them, and are there again when it is opened.
+fn recall(w: &mut Window, path: &Path) {
+    let presses = w.session().document.state.project.live.presses.clone();
+    assert!(presses.len() >= 12 && presses.iter().all(|p| p.board.is_some()));
+    w.session_mut().save_to(path);
+    w.wait("the file", 20, |_| path.is_file());
+    w.session_mut().open_path(path, None);
+    w.wait("the project", 30, |s| s.session.known_touches() == 0);
+    assert_eq!(w.session().document.path.as_deref(), Some(path));
+    assert_eq!(w.session().document.state.project.live.presses, presses);
+    w.stage("Live");
+    w.press("Start a simulated board");
+    w.wait("the touches of before", 120, |s| {
+        s.session.known_touches() == presses.len()
+    });
 }
 
 /// All three estimators beside each other; the trained ones learn in the background.

@@ -206,7 +206,7 @@ impl Designed {
         let mut project = self.inputs.project.clone();
         let noise = vec![sensing.off.of_channel(); gains.len()];
         let found = calibrate(&sensing.drawn, &known, &noise, &sensing.off);
-        project.live.take(&found, &sensing.sites);
+        project.live.take(&found, &sensing.sites, Vec::new());
         let path = self.beside(&format!("calibrated-{seed}.hapdef.toml"));
         project_file::save(&path, &project, None, &self.inputs.masks).unwrap();
         path

@@ -7,7 +7,7 @@
 use anyhow::Context as _;
 use clap::ValueEnum;
 
-use super::summary::{PressRow, Summary};
+use super::summary::{FittedBedding, PressRow, Summary};
 use crate::cli::common::Common;
 use crate::cli::progress::Bar;
 use crate::design::{self, Inputs, Sensing};
@@ -39,15 +39,6 @@ pub struct FittedPart {
     pub thickness: Option<[f64; 2]>,
     /// How stiff the supports are (N/mm³), likewise.
     pub bedding: Option<FittedBedding>,
-}
-
-/// What presses say of the supports.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FittedBedding {
-    /// That they do not give way is as likely as anything else.
-    Firm,
-    /// This bedding, and its standard deviation (N/mm³).
-    Gives([f64; 2]),
 }
 
 /// How far off the stiffness is taken to be where it is to be found (a share, as a standard deviation).

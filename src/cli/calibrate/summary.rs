@@ -5,7 +5,6 @@ use std::path::Path;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::part::FittedBedding;
 use crate::cli::out;
 use crate::design::Sensing;
 use crate::inference::calibration::judged::PressOutlook;
@@ -13,6 +12,7 @@ use crate::inference::{Calibration, KnownPress};
 use crate::io::atomic;
 use crate::io::table::Writing;
 use crate::plain::digits;
+use crate::project::PressKeys;
 
 /// One press.
 pub struct PressRow {
@@ -35,6 +35,15 @@ impl PressRow {
         (self.used, self.why) = (false, Some(why));
     }
 
+    /// As a project keeps it; nothing where nothing was read.
+    pub fn keys(&self) -> Option<PressKeys> {
+        let known = self.known.as_ref()?;
+        Some(PressKeys {
+            used: self.used,
+            ..PressKeys::new(self.place * 1e-3, self.force, &known.reading)
+        })
+    }
+
     fn json(&self) -> Value {
         json!({
             "x_mm": rounded(self.place.x),
@@ -46,6 +55,15 @@ impl PressRow {
             "why": self.why,
         })
     }
+}
+
+/// What presses say of the supports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FittedBedding {
+    /// That they do not give way is as likely as anything else.
+    Firm,
+    /// This bedding, and its standard deviation (N/mm³).
+    Gives([f64; 2]),
 }
 
 /// What was found of the part, each with its standard deviation; nothing of what was not asked for.

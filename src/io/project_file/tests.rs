@@ -96,6 +96,10 @@ fn full() -> Project {
     });
     p.live.channels = vec![3, 1, 2];
     p.live.glued.push(glued());
+    let mut press = crate::project::PressKeys::new(glam::DVec3::X, 4.5, &[1e-6, f64::NAN, -3e-5]);
+    press.used = false;
+    press.board = Some("0000002a".into());
+    p.live.presses.push(press);
     p.evaluation.estimator = crate::evaluation::EstimatorKind::Matching;
     p.evaluation.forces_n = vec![0.5, 1.0 / 3.0 + 1.0];
     p.evaluation.regions.push(RegionKeys {

@@ -19,6 +19,7 @@ fn is_in_a_list(key: &Key) -> bool {
         "selection.site",
         "evaluation.region",
         "live.glued",
+        "live.press",
     ];
     lists.contains(&key.table()) || key.table().starts_with("kept")
 }

@@ -9,6 +9,7 @@ use crate::design::Sensing;
 use crate::inference::calibration::judged::misfits;
 use crate::inference::{Calibration, KnownPress, calibrate};
 use crate::job::Reporter;
+use crate::project::PressKeys;
 use crate::session::jobs::Task;
 use crate::session::slot::{Slot, current};
 use crate::session::state::Session;
@@ -50,6 +51,7 @@ impl Session {
     /// Takes the next touches of a simulated board as known ones, and calibrates with them.
     pub fn calibrate_from_board(&mut self) {
         self.live.known.clear();
+        self.live.known_recalled = true;
         self.live.known_version += 1;
         // One that was read meanwhile is not of these.
         drop(self.live.gathered());
@@ -104,11 +106,62 @@ impl Session {
         }
     }
 
+    /// The known touches of these gauges as the project keeps them, with the board that read them.
+    fn presses_to_keep(&self) -> Vec<PressKeys> {
+        let board = self.board_number();
+        let keep = |touch: &KnownTouch| {
+            let at = self.known_place(touch)?;
+            Some(PressKeys {
+                used: touch.used,
+                board: board.clone(),
+                ..PressKeys::new(at, touch.press.force, &touch.press.reading)
+            })
+        };
+        let touches = self.known_list().map(|(_, touch)| touch);
+        touches.filter_map(keep).collect()
+    }
+
+    /// The number of the board that is connected, in hexadecimal.
+    fn board_number(&self) -> Option<String> {
+        let board = self.live.look(|f| f.hello.as_ref().map(|h| h.board));
+        board.flatten().map(|board| format!("{board:08x}"))
+    }
+
+    /// Takes the known touches that the project keeps of these gauges and this board: once, and not beside others.
+    fn recall_known(&mut self, sensing: &Sensing) {
+        let Some(board) = self.board_number() else {
+            return;
+        };
+        if std::mem::replace(&mut self.live.known_recalled, true) || !self.live.known.is_empty() {
+            return;
+        }
+        let project = &self.document.state.project;
+        let kept = project.live.presses_of(&project.selection.sites).iter();
+        let inputs = self.document.sensing_inputs();
+        let recalled = kept
+            .filter(|press| press.may_be_of(&board))
+            .map(|press| Slot {
+                inputs: inputs.clone(),
+                value: KnownTouch {
+                    press: KnownPress {
+                        at: sensing.drawn.map.mesh.index().nearest(press.position()).0,
+                        force: press.force_n,
+                        reading: press.reading(),
+                    },
+                    used: press.used,
+                    misfit: None,
+                },
+            });
+        self.live.known = recalled.collect();
+        self.live.known_version += 1;
+    }
+
     /// Takes in what was read meanwhile.
     pub(super) fn gather_known(&mut self) {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
+        self.recall_known(&sensing);
         let from_board = self.live.awaited() == Awaited::Board;
         for gathered in self.live.gathered() {
             self.keep_known(&sensing, &gathered);
@@ -222,8 +275,9 @@ impl Session {
     }
 
     fn take_calibration(&mut self, found: &Calibration) {
+        let presses = self.presses_to_keep();
         let project = &mut self.document.state.project;
-        project.live.take(found, &project.selection.sites);
+        (project.live).take(found, &project.selection.sites, presses);
         self.tell(format!(
             "Calibrated with {} known touches; what is still off is about {:.1} % of a reading",
             found.touches,

@@ -51,6 +51,8 @@ pub struct Live {
     pub(in crate::session) target: Option<Target>,
     /// Known touches, with the gauges that read them: of others they say nothing.
     pub(in crate::session) known: Vec<Slot<SensingInputs, KnownTouch>>,
+    /// Whether those that the project keeps were taken in.
+    pub(in crate::session) known_recalled: bool,
     /// Counts what is done to these.
     pub(in crate::session) known_version: u64,
     /// For which of these versions it was looked at whether they fit each other.
