@@ -361,7 +361,7 @@ fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, Des
 /// [`DesignError::Value`] for a support that names no layer there is.
 pub fn on_what_is_held(inputs: &Inputs, touches: &[Touch]) -> Result<Vec<usize>, DesignError> {
     let supports = inputs.project.supports(&inputs.masks)?;
-    let holds = |s: &&Support| (0..3).all(|i| s.held.holds(i));
+    let holds = |s: &&Support| s.bedding.is_none() && (0..3).all(|i| s.held.holds(i));
     let held: Vec<&Support> = supports.iter().filter(holds).collect();
     let index = inputs.part.index();
     let is_held = |&k: &usize| {

@@ -163,9 +163,14 @@ impl Bench {
 
     /// What a board sends while it is pressed.
     fn record(&self, options: &[&str]) -> PathBuf {
+        self.record_at("draft", options)
+    }
+
+    /// The same, of a board whose limb is computed as finely as that.
+    fn record_at(&self, quality: &str, options: &[&str]) -> PathBuf {
         let recording = self.at("board.hapdrec");
         let script = self.at("script.csv");
-        let mut arguments = vec!["board", PROJECT, "--simulate", "--quality", "draft"];
+        let mut arguments = vec!["board", PROJECT, "--simulate", "--quality", quality];
         arguments.extend(["--seed", "4", "--script", text(&script)]);
         arguments.extend(["--record", text(&recording)]);
         arguments.extend(options);
@@ -449,6 +454,29 @@ fn a_palm_is_an_area() {
     let wrong = areas.iter().map(wrong).sum::<f64>() / areas.len() as f64;
     println!("{share:.3} are areas, their forces {wrong:.2} N off");
     assert!(share > 0.75 && wrong < 1.5);
+}
+
+/// Of exact gauges and touches that press straight the map is all that is off: a finer one finds them nearer.
+#[test]
+fn a_finer_map_finds_touches_nearer() {
+    let bench = Bench::of(in_turn(3.0, 1.5, 0.6, &places(12), 10.0));
+    let recording = bench.record_at("standard", &BOARD);
+    let project = bench.project(&[
+        ("place_mm", "0.0"),
+        ("angle_deg", "0.0"),
+        ("gain_percent", "0.0"),
+        ("friction_percent", "0.0"),
+        ("model_error", "0.03"),
+    ]);
+    let found = ["draft", "reference"].map(|quality| {
+        let (heard, _) = listen_with(&recording, &project, &["--quality", quality]);
+        let (mean, held) = bench.off(&heard);
+        println!("{quality}: {mean:.2} mm, {held:.2} held");
+        assert!(bench.felt(&heard) > 0.99);
+        mean
+    });
+    let [draft, reference] = found;
+    assert!(reference < 0.35 && reference < 0.6 * draft, "{found:?}");
 }
 
 /// Regressions that are trained on touches of the model find the place where they are asked for; how many touch, matching says

@@ -83,6 +83,11 @@ fn held(support: &SupportKeys, inputs: &Inputs) -> String {
         SupportKind::Pinned => "pinned",
         SupportKind::Symmetry => "held as by a mirror plane",
     };
+    let gives = support.bedding().and(support.bedding_n_per_mm3);
+    let how = gives.map_or_else(
+        || how.to_owned(),
+        |b| format!("{how}, on a bedding of {} N/mm³,", plain::digits(b)),
+    );
     let place = match (&support.box_mm, &support.vertices) {
         (Some([from, to]), _) => {
             let along = (support.box_axis).map_or_else(String::new, |axis| {
