@@ -2,9 +2,10 @@
 //!
 //! A [`PressingRun`] is cheap: it says whether a folder can be begun in, or gone on with. What is pressed takes the model of the
 //! gauges ([`Ready`]); a [`Collector`](crate::bench::Collector) then goes through it at real ports ([`Ready::press_at`]) or
-//! on a simulated bench ([`press_on_simulated`]).
+//! on a simulated bench ([`press_on_simulated`]). Without a machine somebody presses by hand ([`HandRun`]).
 
 mod asked;
+mod by_hand;
 mod dataset;
 mod places;
 mod ready;
@@ -14,6 +15,7 @@ mod run;
 mod simulated;
 
 pub use asked::{BenchRequest, Flaws};
+pub use by_hand::{HandOrder, HandRun, HandSays};
 pub use dataset::{CollectedRun, Wanted};
 pub use ready::{Ready, pressed};
 pub use rounds::{Met, PressErrors, Round, RunGoal};

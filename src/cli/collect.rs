@@ -1,6 +1,7 @@
 //! `hapdef collect`: a machine presses the limb at many places, and what the gauges read is written down.
 
 mod args;
+mod by_hand;
 
 use std::collections::BTreeSet;
 use std::io::BufRead as _;
@@ -34,6 +35,9 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     let ports = ports(args)?;
     make_folder(&args.out)?;
     let sensing = Arc::new(sensing_for(&args.common, &loaded)?);
+    if args.by_hand {
+        return by_hand::run(args, run, loaded.inputs, sensing);
+    }
     let ready = Ready::new(run, loaded.inputs, sensing)?;
     for line in ready.in_words() {
         out::say(&line);
@@ -145,7 +149,7 @@ fn say_met(met: &Met) {
 
 /// Printer and board, where they are real.
 fn ports(args: &CollectArgs) -> anyhow::Result<Option<(Address, Address)>> {
-    if args.simulate || args.plan_only {
+    if args.simulate || args.plan_only || args.by_hand {
         return Ok(None);
     }
     let (Some(printer), Some(board)) = (&args.printer, &args.board) else {

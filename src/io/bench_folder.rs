@@ -75,6 +75,9 @@ pub struct PressedPart {
     pub active_arms: u8,
     /// Whether machine and board are simulated.
     pub simulated: bool,
+    /// Whether somebody pressed, and no machine: its text may be empty then.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub by_hand: bool,
 }
 
 /// Key of a part and the gauges that were chosen on it: what an estimator was learned on.

@@ -20,6 +20,8 @@ pub struct BenchPress {
     pub steps: Vec<Depth>,
     /// After it (counts).
     pub after: Vec<f64>,
+    /// How hard it was (N), where that was told and not felt.
+    pub force: Option<f64>,
     /// What board read it.
     pub board: Option<Hello>,
 }
@@ -86,6 +88,11 @@ impl PressScribe {
             "press" => self.open = self.begun(rest),
             "read" => self.reading = Some((rest.to_owned(), SampleMean::default(), 0)),
             "end" => self.close(),
+            "force" => {
+                if let Some(press) = &mut self.open {
+                    press.force = rest.parse().ok();
+                }
+            }
             "again" | "failed" => (self.open, self.reading) = (None, None),
             "pressed" => {
                 let whole = |p: &BenchPress| !p.rest.is_empty() && !p.steps.is_empty();
@@ -113,6 +120,7 @@ impl PressScribe {
             rest: Vec::new(),
             steps: Vec::new(),
             after: Vec::new(),
+            force: None,
             board: self.board.clone(),
         })
     }

@@ -26,6 +26,8 @@ pub struct BenchRequest {
     pub check: usize,
     /// A simulated bench in place of a printer and a board, and what is wrong with it.
     pub simulated: Option<Flaws>,
+    /// Somebody presses, and no machine: a machine's file only says what feels how hard.
+    pub by_hand: bool,
 }
 
 impl Default for BenchRequest {
@@ -41,6 +43,7 @@ impl Default for BenchRequest {
             most_force_n: limits.most_force,
             check: 20,
             simulated: None,
+            by_hand: false,
         }
     }
 }

@@ -125,10 +125,16 @@ fn columns(
     about: &PressedPart,
     presses: &[BenchPress],
 ) -> anyhow::Result<TouchColumns> {
-    let machine = machine_file::parse(&about.machine)
-        .map_err(anyhow::Error::msg)?
-        .machine;
-    let sensor = machine.sensor.map(|mut sensor| {
+    let machine = match &about.machine[..] {
+        // Pressed by hand, and how hard was told.
+        "" if about.by_hand => None,
+        text => Some(
+            machine_file::parse(text)
+                .map_err(anyhow::Error::msg)?
+                .machine,
+        ),
+    };
+    let sensor = machine.and_then(|m| m.sensor).map(|mut sensor| {
         if about.simulated {
             sensor.channel = about.channels.len();
         }
@@ -148,7 +154,7 @@ fn columns(
         let chain = press.board.as_ref().map_or(chain, |b| chain.of_board(b));
         let last = press.steps.len().saturating_sub(1);
         for (k, step) in press.steps.iter().enumerate() {
-            let force = force(&step.counts, &press.rest);
+            let force = press.force.or_else(|| force(&step.counts, &press.rest));
             let read = wanted.all_depths || k == last;
             if !read || force.is_some_and(|f| f < wanted.least_force) {
                 continue;

@@ -58,7 +58,7 @@ fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(PressedPart, 
         "the project has no gauges yet: choose them first (hapdef design)"
     );
     ensure!(
-        asked.force_n < asked.most_force_n,
+        asked.by_hand || asked.force_n < asked.most_force_n,
         "the force that is enough, {} N, must be less than that at which the machine stops, {} N",
         asked.force_n,
         asked.most_force_n
@@ -67,7 +67,12 @@ fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(PressedPart, 
         (source::read_text(path)?, machine_file::read(path)?)
     } else {
         let file = machine_file::parse(machine_file::PAPER).map_err(anyhow::Error::msg)?;
-        (machine_file::PAPER.to_owned(), file)
+        let text = if asked.by_hand {
+            ""
+        } else {
+            machine_file::PAPER
+        };
+        (text.to_owned(), file)
     };
     if asked.simulated.is_some()
         && let Some(sensor) = &mut file.machine.sensor
@@ -89,6 +94,7 @@ fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(PressedPart, 
         gauge_factor: settings.chain.gauge_factor,
         active_arms: settings.chain.active_arms,
         simulated: asked.simulated.is_some(),
+        by_hand: asked.by_hand,
     };
     Ok((about, file))
 }
@@ -100,7 +106,7 @@ fn same(before: &PressedPart, now: &PressedPart, folder: &Path) -> anyhow::Resul
     } else if before.machine != now.machine {
         "another machine file"
     } else if before != now {
-        "other settings (seed, step, depth, forces, channels, or simulated and not)"
+        "other settings (seed, step, depth, forces, channels, by hand or simulated and not)"
     } else {
         return Ok(());
     };

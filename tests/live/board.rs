@@ -12,7 +12,7 @@ use hapdef::wire::{Decoded, Decoder, Hello, VERSION, WireMessage, encode};
 use serde_json::Value;
 
 /// A program that ends with the test.
-struct Running {
+pub struct Running {
     child: Child,
     out: Receiver<String>,
     err: Receiver<String>,
@@ -37,7 +37,7 @@ fn lines(source: impl Read + Send + 'static) -> Receiver<String> {
     receiver
 }
 
-fn start(args: &[&str]) -> Running {
+pub fn start(args: &[&str]) -> Running {
     let mut child = Command::new(env!("CARGO_BIN_EXE_hapdef"))
         .args(args)
         .stdout(Stdio::piped())
@@ -56,7 +56,7 @@ impl Running {
             .expect("a line")
     }
 
-    fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         serde_json::from_str(&self.line()).unwrap()
     }
 

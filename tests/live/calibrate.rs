@@ -9,7 +9,7 @@ use glam::DVec3;
 use serde_json::Value;
 
 /// Runs the program; what it prints.
-fn hapdef(arguments: &[&str]) -> Result<String, String> {
+pub fn hapdef(arguments: &[&str]) -> Result<String, String> {
     let done = Command::new(env!("CARGO_BIN_EXE_hapdef"))
         .args(arguments)
         .output()
@@ -21,7 +21,7 @@ fn hapdef(arguments: &[&str]) -> Result<String, String> {
 }
 
 /// Places around the limb (mm), evenly enough.
-fn places(count: usize, turned: f64) -> Vec<DVec3> {
+pub fn places(count: usize, turned: f64) -> Vec<DVec3> {
     (0..count)
         .map(|k| {
             let angle = TAU * (0.381_966 * k as f64 + turned);

@@ -7,6 +7,7 @@
 mod window;
 
 mod board;
+mod by_hand;
 mod calibrate;
 mod display;
 mod ends;

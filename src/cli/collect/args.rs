@@ -12,6 +12,10 @@ use crate::link::BAUD;
 use crate::test_bed::{BenchRequest, Flaws};
 
 #[derive(Args, Debug, Clone)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
 pub struct CollectArgs {
     #[command(flatten)]
     pub common: Common,
@@ -31,6 +35,10 @@ pub struct CollectArgs {
     /// its board.
     #[arg(long, conflicts_with_all = ["printer", "board"])]
     pub simulate: bool,
+    /// Somebody presses, one place after another: no machine. Where the board has no force sensor (that of --machine), write how
+    /// hard each press was, or nothing where it was as hard as --force.
+    #[arg(long, requires = "board", conflicts_with_all = ["printer", "simulate", "until", "plan_only"])]
+    pub by_hand: bool,
     /// Places, evenly over what touches get to.
     #[arg(long, default_value_t = 300, value_parser = whole(1, 100_000))]
     pub places: usize,
@@ -43,9 +51,9 @@ pub struct CollectArgs {
     /// How deep a place is pressed, from where it is first felt (mm).
     #[arg(long, default_value_t = 2.0, value_parser = between(0.01, 50.0))]
     pub depth: f64,
-    /// The force that is enough (N).
-    #[arg(long, default_value_t = 25.0, value_parser = between(0.1, 1e4))]
-    pub force: f64,
+    /// The force that is enough (N): 25 by a machine, 10 by hand.
+    #[arg(long, value_parser = between(0.1, 1e4))]
+    pub force: Option<f64>,
     /// The force at which the machine stops and takes its tip back (N).
     #[arg(long, default_value_t = 35.0, value_parser = between(0.1, 1e4))]
     pub most_force: f64,
@@ -100,6 +108,11 @@ pub struct FaultArgs {
 }
 
 impl CollectArgs {
+    /// See [`Self::force`].
+    pub(super) fn force_n(&self) -> f64 {
+        self.force.unwrap_or(if self.by_hand { 10.0 } else { 25.0 })
+    }
+
     /// What is asked of the run.
     pub(super) fn asked(&self) -> BenchRequest {
         let faults = &self.faults;
@@ -117,11 +130,12 @@ impl CollectArgs {
             points: self.points.clone(),
             step_mm: self.step,
             depth_mm: self.depth,
-            force_n: self.force,
+            force_n: self.force_n(),
             most_force_n: self.most_force,
             // What only is planned is pressed nowhere.
             check: if self.plan_only { 0 } else { self.check },
             simulated: self.simulate.then(flaws),
+            by_hand: self.by_hand,
         }
     }
 }
