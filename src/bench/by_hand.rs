@@ -44,6 +44,12 @@ pub struct HandPresses {
 }
 
 impl HandPresses {
+    /// Whether a press is on.
+    #[must_use]
+    pub fn is_felt(&self) -> bool {
+        self.presses.state().0
+    }
+
     /// Takes in a sample with what was made of it, the noise of each gauge (strain) and whether it is trusted.
     pub fn take(
         &mut self,

@@ -109,7 +109,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let points = on_part(points, &sensing, args.force);
     let off = part::unsure(&args.fit, off_with(&loaded, &sensing, args.machine));
     let read = read((address, held), &loaded, &sensing, points)?;
-    let noise = read.noise.clone();
+    let (noise, board) = (read.noise.clone(), read.board.clone());
     let rows = read.rows(&sensing.drawn.map.mesh);
     if let Some(path) = &args.table {
         // Whoever pressed by hand keeps that, whatever comes of it.
@@ -124,7 +124,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.table {
         summary::write_table(path, &found.rows)?;
     }
-    save(&loaded, &target, &found)?;
+    save(&loaded, &target, &found, board.as_deref())?;
     found.print(&sensing, &target, args.common.json)
 }
 
@@ -234,6 +234,9 @@ fn read(
     let stop = AtomicBool::new(false);
     let listener = Listener::new(address, pipeline).holding(held);
     let ended = listener.run(&stop, &inbox, |event| {
+        if let SessionEvent::Hello(hello) = &event {
+            asked.board = Some(format!("{:08x}", hello.board));
+        }
         if let SessionEvent::Message(text) | SessionEvent::Trouble(text) = &event {
             out::say(&format!("hapdef: {text}"));
         }
@@ -311,7 +314,12 @@ fn next(
 }
 
 /// Writes the project with what was found, and nothing else changed.
-fn save(loaded: &LoadedProject, target: &Path, found: &Summary) -> anyhow::Result<()> {
+fn save(
+    loaded: &LoadedProject,
+    target: &Path,
+    found: &Summary,
+    board: Option<&str>,
+) -> anyhow::Result<()> {
     let own = !loaded.bundled && loaded.path.is_file();
     let fresh = own.then(|| project_file::load(&loaded.path)).transpose()?;
     let mut project = fresh.map_or_else(|| loaded.inputs.project.clone(), |l| l.inputs.project);
@@ -326,7 +334,7 @@ fn save(loaded: &LoadedProject, target: &Path, found: &Summary) -> anyhow::Resul
     if let Some([modulus, _]) = found.of_part.youngs_modulus_gpa {
         project.material.youngs_modulus_gpa = modulus;
     }
-    let presses = found.rows.iter().filter_map(PressRow::keys);
+    let presses = found.rows.iter().filter_map(|row| row.keys(board));
     let sites = &loaded.inputs.project.selection.sites;
     (project.live).take(&found.calibration, sites, presses.collect());
     let folder = target.parent().unwrap_or(Path::new("."));

@@ -20,6 +20,8 @@ pub fn walled(inputs: &Inputs) -> Option<Inputs> {
     project.part.model = PartModel::Solid;
     for support in &mut project.supports {
         reach_through(support, &inputs.part, thickness / 2.0);
+        // Both faces of the wall stand on what held its middle.
+        support.bedding_n_per_mm3 = support.bedding_n_per_mm3.map(|b| b / 2.0);
     }
     // Both faces have the vertices of the middle, the outer ones first.
     let twice = |mask: &Arc<Vec<bool>>| Arc::new([mask.as_slice(), mask.as_slice()].concat());

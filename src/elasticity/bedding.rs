@@ -1,8 +1,9 @@
 //! Supports that give way: springs all over what they hold (Winkler's bedding).
 //!
 //! A clamp that is screwed to plastic, a foot on rubber or a printed joint moves a little with what it holds. The traction
-//! at a place is its bedding (Pa/m) times how far the surface moves there. Over a wall of thickness t that turns, the same
-//! springs at its two faces push back with a moment of bedding · t²/12 an area and a radian.
+//! at a place is its bedding (Pa/m) times how far the surface moves there: of a shell its mid-surface, of a solid every face in the
+//! support. Where a wall of thickness t turns, springs spread through it push back with a moment of bedding · t²/12 an area
+//! and a radian.
 
 use super::support::HeldPart;
 use crate::mesh::{SurfacePoint, TriMesh};

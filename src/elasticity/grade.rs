@@ -107,7 +107,9 @@ impl ShellGround {
     /// # Errors
     /// [`ElasticError`] saying what is loose.
     pub fn check_held(&self) -> Result<(), ElasticError> {
-        check_held(&self.held.mesh, &self.held.held).map_err(|error| match &self.own {
+        check_held(&self.held.mesh, &self.held.held, &self.held.firm()).map_err(|error| match &self
+            .own
+        {
             Some(own) => as_in_the_file(error, own),
             None => error,
         })

@@ -53,7 +53,7 @@ impl ShellModel {
         watch: Watch,
     ) -> Result<Self, ElasticError> {
         check_section(&section)?;
-        check_held(mesh, &with_springs(held, &springs))?;
+        check_held(mesh, &with_springs(held, &springs), held)?;
         check_areas(mesh)?;
         report(watch, "Assembling", 0, 1)?;
         let unknowns = number_unknowns(held.iter().flat_map(|h| (0..6).map(|i| h.holds(i))));
@@ -262,11 +262,11 @@ fn check_areas(mesh: &TriMesh) -> Result<(), ElasticError> {
     })
 }
 
-/// Each connected piece must have its six rigid motions held.
+/// Each connected piece must have its six rigid motions held, by springs too; `firm` is what does not give way.
 ///
 /// # Errors
 /// [`ElasticError`] saying what is loose.
-pub fn check_held(mesh: &TriMesh, held: &[DofSet]) -> Result<(), ElasticError> {
+pub fn check_held(mesh: &TriMesh, held: &[DofSet], firm: &[DofSet]) -> Result<(), ElasticError> {
     let (lower, upper) = mesh.bounds();
     if held.iter().all(|h| h.0 == 0) {
         return Err(ElasticError::NothingHeld {
@@ -274,7 +274,7 @@ pub fn check_held(mesh: &TriMesh, held: &[DofSet]) -> Result<(), ElasticError> {
             upper: upper * 1000.0,
         });
     }
-    if held.iter().all(|h| *h == DofSet::ALL) {
+    if firm.iter().all(|h| *h == DofSet::ALL) {
         return Err(ElasticError::AllHeld);
     }
     let labels = crate::mesh::components(mesh.positions().len(), mesh.triangles());

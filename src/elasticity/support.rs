@@ -174,13 +174,24 @@ impl HeldPart {
     /// What is held there by supports that do not give way.
     #[must_use]
     pub fn held_firmly_at(&self, at: SurfacePoint) -> DofSet {
+        together(self.members_at(at) & self.firm_supports(), &self.kinds)
+    }
+
+    /// What supports that do not give way hold at each vertex of the (cut) part.
+    #[must_use]
+    pub fn firm(&self) -> Vec<DofSet> {
+        let firm = self.firm_supports();
+        let of = |&members: &SupportBits| together(members & firm, &self.kinds);
+        self.members.iter().map(of).collect()
+    }
+
+    fn firm_supports(&self) -> SupportBits {
         let firm = |(k, bedding): (usize, &Option<f64>)| match bedding {
             None => 1 << k,
             Some(_) => 0,
         };
-        let firm = self.bedding.iter().enumerate().map(firm);
-        let firm: SupportBits = firm.fold(0, |all, bit| all | bit);
-        together(self.members_at(at) & firm, &self.kinds)
+        let bits = self.bedding.iter().enumerate().take(MOST).map(firm);
+        bits.fold(0, |all, bit: SupportBits| all | bit)
     }
 
     /// Supports that give way: their number, what they hold, and their bedding (Pa/m).

@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | `key` | bytes | the fingerprint of program, part and project |
 //! | `scalars` | 2 | mean edge of the elements (mm), error of their strain (%) |
-//! | `gauges` | gauges × 11 | place (m), direction, normal, length and width (m) |
+//! | `gauges` | gauges × 9 | place (m), direction, normal |
 //! | `pressed_positions`, `pressed_triangles` | × 3 | the surface that touches press on (m) |
 //! | `weights` | vertices × gauges × 3 | strain a newton along x, y, z |
 //! | `map_positions`, `map_triangles` | × 3 | the surface that readings are known on (m) |

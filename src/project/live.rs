@@ -153,13 +153,9 @@ impl LiveKeys {
     }
 
     /// The known touches of the gauges at these very sites.
-    #[must_use]
-    pub fn presses_of(&self, sites: &[ChosenSite]) -> &[PressKeys] {
-        if self.is_of(sites) {
-            &self.presses
-        } else {
-            &[]
-        }
+    pub fn presses_of(&self, sites: &[ChosenSite]) -> impl Iterator<Item = &PressKeys> {
+        let (is_of, gauges) = (self.is_of(sites), sites.len());
+        (self.presses.iter()).filter(move |p| is_of && p.reading_microstrain.len() == gauges)
     }
 
     /// How each gauge is glued; nothing without a calibration of the gauges at these very sites.
@@ -215,14 +211,6 @@ impl LiveKeys {
                     value: format!("{count} for {gauges} gauges"),
                 });
             }
-        }
-        let reads = |press: &PressKeys| press.reading_microstrain.len() == gauges;
-        if let Some(press) = self.presses.iter().find(|press| !reads(press)) {
-            return Err(BadValue {
-                key: "live.press.reading_microstrain".to_owned(),
-                rule: "one reading for each chosen gauge".into(),
-                value: format!("{} for {gauges} gauges", press.reading_microstrain.len()),
-            });
         }
         let pairs = self.glued.iter().zip(sites);
         let other = pairs

@@ -137,7 +137,12 @@ fn learned(
         forces: &data.forces,
         groups: &groups,
     };
-    let presses = PressLessons::new(sensing, &inputs.project, &lessons, HandPressing::EXACT);
+    let pressing = if collected.about.by_hand {
+        inputs.project.uncertainty().pressing
+    } else {
+        HandPressing::EXACT
+    };
+    let presses = PressLessons::new(sensing, &inputs.project, &lessons, pressing);
     let untaught = presses.as_ref().err().map(ToString::to_string);
     let candidates = TrialMethods {
         regressions: true,

@@ -289,6 +289,7 @@ mod tests {
             },
             used: true,
             misfit: None,
+            board: None,
         };
         s.live.known.push(Slot {
             inputs: s.document.sensing_inputs(),

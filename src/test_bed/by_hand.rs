@@ -14,7 +14,7 @@ use super::run::PressingRun;
 use crate::bench::{HandNews, HandPress, HandPresses};
 use crate::design::{Inputs, Sensing};
 use crate::io::bench_folder;
-use crate::link::{Address, Listener, Recorder, SessionEvent};
+use crate::link::{Address, ConnectionState, Listener, Recorder, SessionEvent};
 use crate::live::Pipeline;
 
 /// What whoever presses may say.
@@ -41,6 +41,8 @@ pub enum HandSays {
     HowHard,
     /// It was not taken: it never stood still, or came before there was a rest.
     Unsteady,
+    /// A force was written, and no press waits for one.
+    NothingWaits,
     /// It is written down, with its force (N) where no sensor feels that.
     Taken(Option<f64>),
     /// What the board or the connection says.
@@ -100,14 +102,15 @@ impl HandRun {
     }
 
     /// Takes one press after another from a board, until all places are pressed or somebody stops; how many were taken.
-    /// `orders` is asked for the next one where how hard a press is is not known.
+    /// `orders` is asked for the next one when the one before was obeyed; with `ahead` forces may be said before their presses, one a
+    /// place.
     ///
     /// # Errors
     /// Why nothing can be read or written.
     pub fn press_at(
         &self,
         board: Address,
-        orders: &mut dyn FnMut() -> Option<HandOrder>,
+        (orders, ahead): (&mut dyn FnMut() -> Option<HandOrder>, bool),
         mut tell: impl FnMut(HandSays),
     ) -> anyhow::Result<usize> {
         let live = &self.inputs.project.live;
@@ -115,12 +118,16 @@ impl HandRun {
         let pipeline = Pipeline::new(self.sensing.map_for(live), settings);
         let part = bench_folder::next_part(&self.folder)?;
         let recorder = Recorder::create(&part).map_err(anyhow::Error::msg)?;
-        let mut desk = HandDesk::new(self, recorder);
+        let mut desk = HandDesk::new(self, recorder, ahead);
         let (_commands, inbox) = channel();
         let stop = AtomicBool::new(false);
         let ended = Listener::new(board, pipeline).run(&stop, &inbox, |event| {
             match event {
                 SessionEvent::Hello(hello) => desk.recorder.hello(hello),
+                // What was felt before is over, and its clock may begin anew.
+                SessionEvent::State(state) if *state != ConnectionState::Live => {
+                    (desk.presses, desk.passed) = (HandPresses::default(), false);
+                }
                 SessionEvent::Message(text) | SessionEvent::Trouble(text) => {
                     tell(HandSays::Board(text.to_owned()));
                 }
@@ -158,24 +165,32 @@ struct HandDesk<'a> {
     presses: HandPresses,
     /// Which of the places that are left is next.
     at: usize,
-    prompted: bool,
+    /// Which of them was asked for last.
+    prompted: Option<usize>,
     /// A press that is over, until it is known how hard it was.
     over: Option<HandPress>,
-    force: Option<f64>,
+    /// What was said and not obeyed yet.
+    order: Option<HandOrder>,
+    /// Whether it may be said before its press.
+    ahead: bool,
+    /// What is pressed just now is of no place any more.
+    passed: bool,
     taken: usize,
     stopped: bool,
 }
 
 impl<'a> HandDesk<'a> {
-    fn new(run: &'a HandRun, recorder: Recorder) -> Self {
+    fn new(run: &'a HandRun, recorder: Recorder, ahead: bool) -> Self {
         Self {
             run,
             recorder,
             presses: HandPresses::default(),
             at: 0,
-            prompted: false,
+            prompted: None,
             over: None,
-            force: None,
+            order: None,
+            ahead,
+            passed: false,
             taken: 0,
             stopped: false,
         }
@@ -187,7 +202,7 @@ impl<'a> HandDesk<'a> {
 
     fn prompt(&mut self, tell: &mut dyn FnMut(HandSays)) {
         if let Some(&number) = self.run.left.get(self.at)
-            && !std::mem::replace(&mut self.prompted, true)
+            && self.prompted.replace(self.at) != Some(self.at)
         {
             let all = self.run.places.len();
             let done = all - self.run.left.len() + self.at;
@@ -196,19 +211,27 @@ impl<'a> HandDesk<'a> {
     }
 
     fn hear(&mut self, news: HandNews, tell: &mut dyn FnMut(HandSays)) {
+        if self.passed {
+            self.passed = news == HandNews::Read;
+            return;
+        }
         match news {
             HandNews::Read => tell(HandSays::LetGo),
             HandNews::Unsteady => {
-                self.force = None;
+                // What was said ahead is of this place still.
+                if !self.ahead {
+                    self.order = None;
+                }
                 tell(HandSays::Unsteady);
             }
             // Pressed again before it was said how hard the one before was: this one is meant.
             HandNews::Over(press) => {
                 self.over = Some(press);
-                if !self.run.has_sensor && self.force.is_none() {
+                if self.run.has_sensor {
+                    self.write(None, tell);
+                } else if self.order.is_none() {
                     tell(HandSays::HowHard);
                 }
-                self.write(tell);
             }
         }
     }
@@ -218,32 +241,37 @@ impl<'a> HandDesk<'a> {
         orders: &mut dyn FnMut() -> Option<HandOrder>,
         tell: &mut dyn FnMut(HandSays),
     ) {
-        // One at a time: what is said ahead is of the presses to come.
-        if self.force.is_some() {
-            return;
+        if self.order.is_none() {
+            self.order = orders();
         }
-        match orders() {
-            Some(HandOrder::Force(force)) => self.force = Some(force),
-            Some(HandOrder::AsMeant) => self.force = Some(self.run.meant_n),
-            Some(HandOrder::Skip) => self.go_on(),
-            Some(HandOrder::Stop) => self.stopped = true,
-            None => return,
+        let Some(order) = self.order else { return };
+        let force = match order {
+            HandOrder::Stop => {
+                self.stopped = true;
+                return;
+            }
+            HandOrder::Skip => return self.go_on(),
+            HandOrder::Force(force) => force,
+            HandOrder::AsMeant => self.run.meant_n,
+        };
+        if self.run.has_sensor {
+            self.order = None;
+        } else if self.over.is_some() {
+            self.write(Some(force), tell);
+        } else if !self.ahead && !self.presses.is_felt() {
+            self.order = None;
+            tell(HandSays::NothingWaits);
         }
-        self.write(tell);
     }
 
     fn go_on(&mut self) {
-        (self.over, self.force) = (None, None);
+        (self.over, self.order) = (None, None);
+        self.passed = self.presses.is_felt();
         self.at += 1;
-        self.prompted = false;
     }
 
-    /// Writes a press down once it is over and its force is known, as the notes of a machine's presses are.
-    fn write(&mut self, tell: &mut dyn FnMut(HandSays)) {
-        let force = self.force.filter(|_| !self.run.has_sensor);
-        if self.is_over() || self.over.is_none() || !(self.run.has_sensor || force.is_some()) {
-            return;
-        }
+    /// Writes down the press that is over, as the notes of a machine's presses are, with its force (N) where that is told.
+    fn write(&mut self, force: Option<f64>, tell: &mut dyn FnMut(HandSays)) {
         let (Some(press), Some(&number)) = (self.over.take(), self.run.left.get(self.at)) else {
             return;
         };

@@ -19,6 +19,8 @@ pub struct AskedPresses {
     first_us: Option<u64>,
     /// Of each channel (strain).
     pub noise: Vec<f64>,
+    /// The number of the board, in hexadecimal, where it has said one.
+    pub board: Option<String>,
 }
 
 impl AskedPresses {
@@ -33,6 +35,7 @@ impl AskedPresses {
             said_read: false,
             first_us: None,
             noise: Vec::new(),
+            board: None,
         }
     }
 

@@ -50,6 +50,11 @@ pub fn check(fit: &[PartArg], project: &Project) -> anyhow::Result<()> {
         !fit.contains(&PartArg::Thickness) || project.part.model == PartModel::Shell,
         "--fit thickness: the part is a solid, whose walls are those of its mesh; fit its stiffness, or open the middle of its walls as a shell"
     );
+    let gives_way = project.supports.iter().any(|s| s.bedding().is_some());
+    anyhow::ensure!(
+        !fit.contains(&PartArg::Stiffness) || !gives_way || fit.contains(&PartArg::Supports),
+        "--fit stiffness: the project has supports that give way, and a softer part is not all that moves. Fit them too: --fit stiffness,supports"
+    );
     Ok(())
 }
 
@@ -231,5 +236,9 @@ pub fn take_stiffness(
     let modulus = project.material.youngs_modulus_gpa / factor;
     found.of_part.youngs_modulus_gpa = Some([modulus, modulus * deviation / factor]);
     found.calibration = found.calibration.clone().on_softer(factor);
+    // Readings grow alike where all that gives way is softer alike.
+    if let Some(FittedBedding::Gives(bedding)) = &mut found.of_part.bedding {
+        *bedding = bedding.map(|b| b / factor);
+    }
     Ok(())
 }

@@ -35,11 +35,12 @@ impl PressRow {
         (self.used, self.why) = (false, Some(why));
     }
 
-    /// As a project keeps it; nothing where nothing was read.
-    pub fn keys(&self) -> Option<PressKeys> {
+    /// As a project keeps it, read by a board of this number; nothing where nothing was read.
+    pub fn keys(&self, board: Option<&str>) -> Option<PressKeys> {
         let known = self.known.as_ref()?;
         Some(PressKeys {
             used: self.used,
+            board: board.map(str::to_owned),
             ..PressKeys::new(self.place * 1e-3, self.force, &known.reading)
         })
     }

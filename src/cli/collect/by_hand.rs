@@ -1,6 +1,6 @@
 //! `hapdef collect --by-hand`: asks for one press after another.
 
-use std::io::BufRead as _;
+use std::io::{BufRead as _, IsTerminal as _};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
@@ -27,7 +27,9 @@ pub fn run(
     if !run.left.is_empty() {
         let inbox = typed(&run);
         out::say("hapdef: waiting for the board; leave the limb alone until its rest is taken");
-        run.press_at(board, &mut || next(&inbox), |says| {
+        // Somebody at a terminal says it of the press that was; a script says all of them beforehand.
+        let ahead = !std::io::stdin().is_terminal();
+        run.press_at(board, (&mut || next(&inbox), ahead), |says| {
             say(&says, args.force_n());
         })?;
     }
@@ -68,6 +70,7 @@ fn say(says: &HandSays, meant_n: f64) {
         HandSays::Unsteady => {
             "it was not taken: leave the limb alone for a moment, then press again and hold it for a second".to_owned()
         }
+        HandSays::NothingWaits => "no press waits for a force".to_owned(),
         HandSays::Taken(Some(force)) => format!("taken, with {force} N"),
         HandSays::Taken(None) => "taken".to_owned(),
         HandSays::Board(text) => format!("hapdef: {text}"),

@@ -292,7 +292,7 @@ impl SolidGround {
         let numbers = self.immersed.held_without_area();
         let said = numbers.iter().map(|k| {
             format!(
-                "Support {} holds the part along lines or at single points only: the smaller the elements are, the more gives way beside them. Hold a face, where that matters.",
+                "Support {} holds the part along lines or at single points only: the smaller the elements are, the more gives way beside them. Hold a face, where that matters, or where it is to give way.",
                 k + 1
             )
         });

@@ -269,6 +269,10 @@ impl Immersed {
                 grip.hold_facet(on, mesh, facet, held, bedding, size);
             }
         }
+        // What gives way is not pinned by an edge or a corner that belongs to it beside its faces.
+        if self.supports[number].bedding.is_some() && self.has_area(number) {
+            return;
+        }
         for edge in self.held.lines_of(number) {
             grip.hold_edge(on, mesh, edge, held, &self.material, size);
         }
@@ -317,13 +321,19 @@ impl Immersed {
     /// The supports, by number, that hold the part along lines or at points only.
     #[must_use]
     pub fn held_without_area(&self) -> Vec<usize> {
-        let facets = 0..self.held.mesh.triangles().len() as u32;
-        let has_area = |&k: &usize| facets.clone().any(|t| self.held.facet_belongs(t, k));
         let holds_some = |&k: &usize| {
             self.held.lines_of(k).next().is_some() || self.held.spots_of(k).next().is_some()
         };
         let supports = 0..self.supports.len();
-        supports.filter(|k| !has_area(k) && holds_some(k)).collect()
+        supports
+            .filter(|&k| !self.has_area(k) && holds_some(&k))
+            .collect()
+    }
+
+    /// Whether a support has facets.
+    fn has_area(&self, support: usize) -> bool {
+        let mut facets = 0..self.held.mesh.triangles().len() as u32;
+        facets.any(|t| self.held.facet_belongs(t, support))
     }
 
     fn grip(&self, cells: &FiniteCells, size: f64) -> Grip {

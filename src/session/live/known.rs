@@ -51,7 +51,7 @@ impl Session {
     /// Takes the next touches of a simulated board as known ones, and calibrates with them.
     pub fn calibrate_from_board(&mut self) {
         self.live.known.clear();
-        self.live.known_recalled = true;
+        self.live.known_recalled = Some((self.board_number(), self.document.sensing_inputs()));
         self.live.known_version += 1;
         // One that was read meanwhile is not of these.
         drop(self.live.gathered());
@@ -70,11 +70,17 @@ impl Session {
         self.known_list().count()
     }
 
-    /// Those that these gauges have read, each with the number by which it is left out or deleted.
+    /// Those that these gauges and the board that is connected have read, each with the number by which it is left out or deleted.
     pub fn known_list(&self) -> impl Iterator<Item = (usize, &KnownTouch)> {
         let inputs = self.document.sensing_inputs();
+        let board = self.board_number();
+        let may_be = move |touch: &KnownTouch| match (&touch.board, &board) {
+            (Some(own), Some(board)) => own == board,
+            _ => true,
+        };
         let all = self.live.known.iter().enumerate();
         all.filter_map(move |(number, slot)| Some((number, current(Some(slot), &inputs)?)))
+            .filter(move |(_, touch)| may_be(touch))
     }
 
     /// Where a known touch was asked for (m); nothing where the gauges are others now.
@@ -108,12 +114,11 @@ impl Session {
 
     /// The known touches of these gauges as the project keeps them, with the board that read them.
     fn presses_to_keep(&self) -> Vec<PressKeys> {
-        let board = self.board_number();
         let keep = |touch: &KnownTouch| {
             let at = self.known_place(touch)?;
             Some(PressKeys {
                 used: touch.used,
-                board: board.clone(),
+                board: touch.board.clone(),
                 ..PressKeys::new(at, touch.press.force, &touch.press.reading)
             })
         };
@@ -127,16 +132,19 @@ impl Session {
         board.flatten().map(|board| format!("{board:08x}"))
     }
 
-    /// Takes the known touches that the project keeps of these gauges and this board: once, and not beside others.
+    /// Takes the known touches that the project keeps of these gauges and this board: once for either, and not beside others.
     fn recall_known(&mut self, sensing: &Sensing) {
-        let Some(board) = self.board_number() else {
-            return;
-        };
-        if std::mem::replace(&mut self.live.known_recalled, true) || !self.live.known.is_empty() {
+        let asked = Some((self.board_number(), self.document.sensing_inputs()));
+        if self.live.known_recalled == asked {
             return;
         }
+        self.live.known_recalled = asked;
+        if self.known_touches() > 0 {
+            return;
+        }
+        let board = self.board_number().unwrap_or_default();
         let project = &self.document.state.project;
-        let kept = project.live.presses_of(&project.selection.sites).iter();
+        let kept = project.live.presses_of(&project.selection.sites);
         let inputs = self.document.sensing_inputs();
         let recalled = kept
             .filter(|press| press.may_be_of(&board))
@@ -150,9 +158,11 @@ impl Session {
                     },
                     used: press.used,
                     misfit: None,
+                    board: press.board.clone(),
                 },
             });
-        self.live.known = recalled.collect();
+        let recalled: Vec<_> = recalled.collect();
+        self.live.known.extend(recalled);
         self.live.known_version += 1;
     }
 
@@ -248,6 +258,7 @@ impl Session {
             press,
             used: true,
             misfit: None,
+            board: self.board_number(),
         };
         self.live.known.push(Slot { inputs, value });
         self.live.known_version += 1;

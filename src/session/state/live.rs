@@ -34,6 +34,8 @@ pub struct KnownTouch {
     /// How far off it is from what all others foresee: weighted squares a channel, about one where it fits. Absent until that
     /// was looked at.
     pub misfit: Option<f64>,
+    /// The number of the board that read it, where it has one.
+    pub board: Option<String>,
 }
 
 /// Trained estimators, and the gauges that they were trained for.
@@ -51,8 +53,8 @@ pub struct Live {
     pub(in crate::session) target: Option<Target>,
     /// Known touches, with the gauges that read them: of others they say nothing.
     pub(in crate::session) known: Vec<Slot<SensingInputs, KnownTouch>>,
-    /// Whether those that the project keeps were taken in.
-    pub(in crate::session) known_recalled: bool,
+    /// For which board and gauges those that the project keeps were taken in.
+    pub(in crate::session) known_recalled: Option<(Option<String>, SensingInputs)>,
     /// Counts what is done to these.
     pub(in crate::session) known_version: u64,
     /// For which of these versions it was looked at whether they fit each other.
