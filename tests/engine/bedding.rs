@@ -15,9 +15,11 @@ use hapdef::project::{Masks, PartModel, Project, SupportKeys, SupportKind};
 const WIDE: f64 = 0.02;
 /// How much of it is held (m), from one end.
 const HELD: f64 = 0.02;
+/// Of the strip.
+const THICK: f64 = 3e-3;
 const FORCE: f64 = 3.0;
 
-/// A strip of 100 × 20 mm as a shell of 1 mm, or a block that is 20 mm high as a solid: held over 20 mm of its length at the
+/// A strip of 100 × 20 mm as a shell of 3 mm, or a block that is 20 mm high as a solid: held over 20 mm of its length at the
 /// bottom.
 fn part(model: PartModel, modulus_gpa: f64, bedding: Option<f64>) -> Inputs {
     let flat = |i: u32, j: u32, z: f64| DVec3::new(f64::from(i) * 0.01, f64::from(j) * 0.01, z);
@@ -50,7 +52,7 @@ fn part(model: PartModel, modulus_gpa: f64, bedding: Option<f64>) -> Inputs {
     }
     let mut project = Project::around("part.glb", None);
     project.part.model = model;
-    project.part.thickness_mm = 1.0;
+    project.part.thickness_mm = THICK * 1e3;
     project.material.youngs_modulus_gpa = modulus_gpa;
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
@@ -99,9 +101,15 @@ fn moved(inputs: &Inputs, pressed: f64, along: [f64; 2]) -> [f64; 2] {
 fn a_stiff_part_moves_as_a_rigid_body_on_springs() {
     const BEDDING: f64 = 20.0;
     let b = BEDDING * 1e9;
-    let (area, turning) = (HELD * WIDE, WIDE * HELD.powi(3) / 12.0);
-    for model in [PartModel::Shell, PartModel::Solid] {
-        let inputs = part(model, 1e6, Some(BEDDING));
+    let area = HELD * WIDE;
+    // A wall is held through its thickness too.
+    let shell = area * (HELD.powi(2) + THICK.powi(2)) / 12.0;
+    let solid = area * HELD.powi(2) / 12.0;
+    for (model, modulus_gpa, turning) in [
+        (PartModel::Shell, 1e5, shell),
+        (PartModel::Solid, 1e3, solid),
+    ] {
+        let inputs = part(model, modulus_gpa, Some(BEDDING));
         let pressed = 0.07;
         let along = [0.03, 0.09];
         let arm = pressed - HELD / 2.0;

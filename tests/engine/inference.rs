@@ -21,7 +21,6 @@ use hapdef::uncertainty::{HandPressing, Uncertainty};
 use hapdef::wire::{WireMessage, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 const NOISE: f64 = 1e-6;
 
@@ -41,7 +40,8 @@ pub fn lab() -> &'static Lab {
 }
 
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    rng.sample(StandardNormal)
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 /// Touches away from the held ends.
