@@ -4,7 +4,6 @@
 //! [`Collector`] goes through a plan of presses: it is given what machine and board say and answers what the machine is to be
 //! told, so that a real printer, and a simulated one in its own time, are driven by the same code.
 
-mod by_hand;
 mod check;
 mod collector;
 mod contact;
@@ -15,7 +14,6 @@ mod plan;
 mod press;
 mod printer;
 
-pub use by_hand::{HandNews, HandPress, HandPresses};
 pub use check::{CheckPlace, CheckedForce};
 pub use collector::{Collector, CollectorNews, RunEnd};
 pub use contact::ContactLaw;

@@ -1,6 +1,7 @@
 //! Live touch, without any port: from a board's bytes to a place on the part.
 
 mod blind;
+mod by_hand;
 mod checking;
 mod counting;
 mod drift;
@@ -18,6 +19,7 @@ mod tremble;
 mod update;
 
 pub use blind::LIGHT_N;
+pub use by_hand::{HandNews, HandPress, HandPresses};
 pub use health::Health;
 pub use news::RestNews;
 pub use pipeline::Pipeline;

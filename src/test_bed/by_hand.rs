@@ -11,11 +11,10 @@ use glam::DVec3;
 use super::places::places;
 use super::ready::pressed;
 use super::run::PressingRun;
-use crate::bench::{HandNews, HandPress, HandPresses};
 use crate::design::{Inputs, Sensing};
 use crate::io::bench_folder;
 use crate::link::{Address, ConnectionState, Listener, Recorder, SessionEvent};
-use crate::live::Pipeline;
+use crate::live::{HandNews, HandPress, HandPresses, Pipeline};
 
 /// What whoever presses may say.
 #[derive(Clone, Copy, Debug, PartialEq)]

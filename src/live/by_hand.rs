@@ -3,7 +3,9 @@
 
 use std::collections::VecDeque;
 
-use crate::live::{LiveUpdate, Presses, Sample};
+use super::presses::Presses;
+use super::receiver::Sample;
+use super::update::LiveUpdate;
 
 /// How long the rest before a press is read (s).
 const REST_S: f64 = 0.4;
