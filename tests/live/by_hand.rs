@@ -150,7 +150,10 @@ fn presses_by_hand_are_collected_stopped_and_gone_on_with() {
         .collect();
     assert_eq!(rows.len(), ALL);
     for (k, &[x, y, z, n]) in rows.iter().enumerate() {
-        assert!(DVec3::new(x, y, z).distance(places[k]) < 1.5, "{rows:?}");
+        // On the wall beside what was asked for, where that is in a window.
+        let far = |place: &DVec3| place.distance(DVec3::new(x, y, z));
+        let nearest = (0..ALL).min_by(|&a, &b| far(&places[a]).total_cmp(&far(&places[b])));
+        assert!(nearest == Some(k) && far(&places[k]) < 10.0, "{rows:?}");
         assert!((n - force(k)).abs() < 1e-9, "{rows:?}");
     }
 }

@@ -470,10 +470,18 @@ fn a_finer_map_finds_touches_nearer() {
     ]);
     let found = ["draft", "reference"].map(|quality| {
         let (heard, _) = listen_with(&recording, &project, &["--quality", quality]);
-        let (mean, held) = bench.off(&heard);
-        println!("{quality}: {mean:.2} mm, {held:.2} held");
+        let mut off: Vec<f64> = (bench.full(&heard))
+            .filter_map(|(press, h)| Some(h.touches.first()?.0.distance(press.place)))
+            .collect();
+        off.sort_by(f64::total_cmp);
+        // At the edge of a window a tip has nothing under its other half: a few places are off by that on any map.
+        let median = off[off.len() / 2];
+        println!(
+            "{quality}: {median:.2} mm, on the mean {:.2}",
+            bench.off(&heard).0
+        );
         assert!(bench.felt(&heard) > 0.99);
-        mean
+        median
     });
     let [draft, reference] = found;
     assert!(reference < 0.35 && reference < 0.6 * draft, "{found:?}");
