@@ -100,6 +100,18 @@ fn presses_by_hand_are_collected_stopped_and_gone_on_with() {
         format!("{}{then}", forces.collect::<String>())
     };
 
+    // The model of the gauges is kept beside the project: whoever listens is there before the first press.
+    let plan = [
+        "--quality",
+        "draft",
+        "--places",
+        "5",
+        "--plan-only",
+        "--out",
+    ];
+    let (elsewhere, of) = (at("elsewhere"), project.to_str().unwrap());
+    hapdef(&[&["collect", of][..], &plan, &[elsewhere.to_str().unwrap()]].concat()).unwrap();
+
     let (board, port) = pressed(folder.path(), &places, 0..FIRST);
     let (said, words) = collect(&project, &run, &points, &port, &typed(0..FIRST, "stop\n"));
     assert_eq!(

@@ -76,7 +76,10 @@ fn sections_mirrors_and_new_boxes_follow_the_axis_of_the_part() {
         let added = &w.session().document.state.project.supports;
         assert_eq!(added.len(), 1);
         assert_eq!(added[0].box_axis.is_some(), turned, "{axis:?}");
-        w.press("Support 1 gives way");
+        w.harness
+            .get_by_label("Support 1 gives way")
+            .click_accesskit();
+        w.harness.run_ok();
         let bedding = w.session().document.state.project.supports[0].bedding_n_per_mm3;
         assert!(bedding.is_some_and(|b| b > 0.0));
         w.assert_named("the supports");

@@ -116,11 +116,11 @@ fn bedding(ui: &mut Ui, support: &str, bedding: &mut Option<f64>) {
     const START: f64 = 50.0;
     let key = SupportKeys::bedding_n_per_mm3();
     let mut gives = bedding.is_some();
-    let name = ui.label("Gives way");
+    // Every support has one: its name says which.
+    ui.label("Gives way");
     let toggled = ui
         .checkbox(&mut gives, "")
         .on_hover_text(key.sentence())
-        .labelled_by(name.id)
         .accessible_name(format!("{support} gives way"));
     ui.end_row();
     if toggled.changed() {
