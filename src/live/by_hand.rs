@@ -108,29 +108,8 @@ fn seconds(from: u64, until: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
-    use crate::inference::{Contact, CredibleRegion, SeveralTouches};
-
-    fn felt() -> SeveralTouches {
-        let contact = Contact {
-            position: DVec3::ZERO,
-            normal: DVec3::Z,
-            force: 1.0,
-            drag: DVec3::ZERO,
-            drag_deviation: 0.0,
-            force_deviation: 0.1,
-            region: CredibleRegion {
-                axes: [DVec3::X, DVec3::Y],
-                radius: 1e-3,
-            },
-            strength: 100.0,
-            narrow: true,
-            unexplained: 1.0,
-        };
-        SeveralTouches::one(contact, 1.0)
-    }
+    use crate::live::presses::tests::felt;
 
     /// A hundred samples a second: strain by the number of the sample, felt from `felt` on.
     fn heard(presses: &mut HandPresses, strain: impl Fn(u64) -> f64, count: u64) -> Vec<HandNews> {

@@ -114,13 +114,14 @@ fn mean<'a>(rows: impl Iterator<Item = &'a (u64, Vec<f64>)> + Clone) -> Vec<f64>
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::DVec3;
 
     use super::*;
     use crate::inference::{Contact, CredibleRegion, SeveralTouches};
 
-    fn update(k: u64, strain: f64) -> LiveUpdate {
+    /// A newton that is felt somewhere.
+    pub fn felt() -> SeveralTouches {
         let contact = Contact {
             position: DVec3::ZERO,
             normal: DVec3::Z,
@@ -136,9 +137,13 @@ mod tests {
             narrow: true,
             unexplained: 1.0,
         };
+        SeveralTouches::one(contact, 1.0)
+    }
+
+    fn update(k: u64, strain: f64) -> LiveUpdate {
         LiveUpdate {
             strain: Some(vec![strain, -strain, 0.0]),
-            touches: (strain != 0.0).then(|| SeveralTouches::one(contact, 1.0)),
+            touches: (strain != 0.0).then(felt),
             ..LiveUpdate::nothing(k * 10_000)
         }
     }

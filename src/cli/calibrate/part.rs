@@ -15,7 +15,7 @@ use crate::inference::KnownPress;
 use crate::inference::calibration::likeliest::{LogLattice, likeliest};
 use crate::inference::calibration::part::of_part;
 use crate::io::project_file::LoadedProject;
-use crate::project::{PartModel, Project, SupportKind};
+use crate::project::{PartModel, Project, SupportKeys, SupportKind};
 use crate::uncertainty::Uncertainty;
 
 /// What may be fitted of a part.
@@ -49,6 +49,11 @@ pub fn check(fit: &[PartArg], project: &Project) -> anyhow::Result<()> {
     anyhow::ensure!(
         !fit.contains(&PartArg::Thickness) || project.part.model == PartModel::Shell,
         "--fit thickness: the part is a solid, whose walls are those of its mesh; fit its stiffness, or open the middle of its walls as a shell"
+    );
+    let can_give = |s: &SupportKeys| s.kind != SupportKind::Symmetry;
+    anyhow::ensure!(
+        !fit.contains(&PartArg::Supports) || project.supports.iter().any(can_give),
+        "--fit supports: the part is held by mirror planes alone, which do not give way; leave supports out of --fit"
     );
     let gives_way = project.supports.iter().any(|s| s.bedding().is_some());
     anyhow::ensure!(
