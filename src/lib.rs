@@ -29,7 +29,7 @@
 //! let inputs = Inputs { project, part: Arc::new(mesh), painted: None, masks: Masks::default() };
 //!
 //! // Dataset: strain at every site under every touch.
-//! let small = Limits { vertices: Some(400), touches: Some(100), expected_places: Some(80), ..Limits::default() };
+//! let small = BudgetLimits { vertices: Some(400), touches: Some(100), expected_places: Some(80), ..Default::default() };
 //! let budget = Budget { test_touches: 50, ..Quality::Draft.budget().within(&small) };
 //! let simulated = Arc::new(simulate(&inputs, &budget, &unwatched)?);
 //! assert_eq!(simulated.dataset.x.columns(), simulated.dataset.touches.len());
