@@ -1,4 +1,4 @@
-//! The test-bed: a plan of presses, and a machine, or a simulated one, that goes through it in the background.
+//! The test-bed: a plan of presses, and a machine, a simulated one or somebody that goes through it in the background.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
@@ -8,14 +8,15 @@ use std::time::{Duration, Instant};
 use super::jobs::{Task, stop};
 use super::slot::Slot;
 use super::state::Session;
-use super::state::bench::{HoldGuard, PlanInputs, PressingPlan, locked};
+use super::state::bench::{Bench, HoldGuard, Orders, PlanInputs, locked};
+use super::state::pressing::{HandStep, PlannedRun, PressingPlan};
 use crate::bench::{Collector, CollectorNews, RunEnd};
 use crate::budget::{Budget, Progress};
 use crate::design::{Inputs, Sensing};
 use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{Address, BY_HAND, BenchOrder, Pace};
-use crate::test_bed::{BenchRequest, PressingRun, Ready, press_on_simulated};
+use crate::test_bed::{BenchRequest, HandOrder, HandRun, PressingRun, Ready, press_on_simulated};
 
 impl Session {
     /// Chooses where is pressed, and shows it. Nothing moves.
@@ -33,10 +34,10 @@ impl Session {
             Task::PlanPresses,
             inputs,
             work,
-            |s, inputs, (sensing, ready)| {
+            |s, inputs, (sensing, run)| {
                 s.keep_sensing(&inputs, &sensing);
                 if !s.bench.goes_on() {
-                    *s.bench.locked() = Some(PressingPlan::new(inputs, ready));
+                    *s.bench.locked() = Some(PressingPlan::new(inputs, run));
                 }
             },
         );
@@ -47,26 +48,23 @@ impl Session {
         let Some(begin) = self.begin_bench() else {
             return;
         };
-        let ports = match self.bench_ports() {
-            Ok(ports) => ports,
+        let by = match self.pressed_by() {
+            Ok(by) => by,
             Err(message) => return self.complain(message),
         };
-        if ports.is_some() {
+        if !matches!(by, PressedBy::Simulated) {
             // One listens to a board, and only one.
             self.disconnect();
         }
-        let (orders, inbox) = channel();
-        self.bench.orders = Some(orders);
-        self.bench.paused = false;
+        let inbox = self.bench.take_orders(matches!(by, PressedBy::Hand(_)));
         let pressing = Arc::clone(&self.bench.pressing);
         let inputs = begin.inputs.clone();
         let held = HoldGuard::new(&self.bench.runs);
         let work = move |r: &Reporter| {
             let _held = held;
-            let (sensing, ready) = begin.ready(r)?;
-            let plan = PressingPlan::new(begin.inputs, Arc::clone(&ready));
-            *locked(&pressing) = Some(plan);
-            let ended = press(&ready, ports.as_ref(), &inbox, &pressing, r);
+            let (sensing, run) = begin.ready(r)?;
+            *locked(&pressing) = Some(PressingPlan::new(begin.inputs, run.clone()));
+            let ended = go_through(&run, &by, &inbox, &pressing, r);
             let stopped = |why: &anyhow::Error| RunEnd::Stopped(format!("{why:#}"));
             let how = ended.as_ref().map_or_else(stopped, RunEnd::clone);
             if let Some(plan) = locked(&pressing).as_mut() {
@@ -96,6 +94,11 @@ impl Session {
     /// Tells the run that goes on.
     pub fn order_bench(&mut self, order: BenchOrder) {
         self.bench.order(order);
+    }
+
+    /// Tells whoever presses by hand.
+    pub fn order_hand(&mut self, order: HandOrder) {
+        self.bench.order_hand(order);
     }
 
     /// Takes the tip back and waits until it is, as the program ends: for a while, a machine may be gone.
@@ -159,23 +162,29 @@ impl Session {
         })
     }
 
-    fn bench_ports(&self) -> Result<Option<(Address, Address)>, String> {
+    fn pressed_by(&self) -> Result<PressedBy, String> {
         let desk = &self.desk.bench;
         if desk.asked.simulated.is_some() {
-            return Ok(None);
+            return Ok(PressedBy::Simulated);
         }
-        let port = |text: &str, what: &str, baud| match text.trim() {
-            "" => Err(format!(
-                "Name the {what}'s port, or press on a simulated bench"
-            )),
-            text => Ok(Address::parse(text, baud, Pace::Real)),
+        let port = |text: &str, what: &str, baud| -> Result<Address, String> {
+            let address = match text.trim() {
+                "" => Err(format!(
+                    "Name the {what}'s port, or press on a simulated bench"
+                )),
+                text => Ok(Address::parse(text, baud, Pace::Real)),
+            }?;
+            if address.is_recording() {
+                return Err(format!("{address}: a recording cannot be pressed"));
+            }
+            Ok(address)
         };
-        let printer = port(&desk.printer, "printer", desk.printer_baud)?;
-        let board = port(&desk.board, "board", self.desk.baud)?;
-        if let Some(recording) = [&printer, &board].into_iter().find(|p| p.is_recording()) {
-            return Err(format!("{recording}: a recording cannot be pressed"));
+        let board = || port(&desk.board, "board", self.desk.baud);
+        if desk.asked.by_hand {
+            return Ok(PressedBy::Hand(board()?));
         }
-        Ok(Some((printer, board)))
+        let printer = port(&desk.printer, "printer", desk.printer_baud)?;
+        Ok(PressedBy::Machine(printer, board()?))
     }
 
     fn keep_sensing(&mut self, inputs: &PlanInputs, sensing: &Arc<Sensing>) {
@@ -196,7 +205,7 @@ struct Begin {
 }
 
 impl Begin {
-    fn ready(&self, r: &Reporter) -> Result<(Arc<Sensing>, Arc<Ready>), Stop> {
+    fn ready(&self, r: &Reporter) -> Result<(Arc<Sensing>, PlannedRun), Stop> {
         let failed = |why: anyhow::Error| Stop::Failed(format!("{why:#}"));
         let folder = &self.inputs.folder;
         std::fs::create_dir_all(folder)
@@ -211,15 +220,127 @@ impl Begin {
             let made = kept_model::sensing(&self.project, path, &self.budget, &watch);
             Arc::new(made.map_err(|e| stop(&e))?)
         };
-        let ready = Ready::new(run, self.project.clone(), Arc::clone(&sensing)).map_err(failed)?;
-        Ok((sensing, Arc::new(ready)))
+        let (project, of) = (self.project.clone(), Arc::clone(&sensing));
+        let run = if self.inputs.asked.by_hand {
+            PlannedRun::Hand(Arc::new(HandRun::new(run, project, of).map_err(failed)?))
+        } else {
+            PlannedRun::Machine(Arc::new(Ready::new(run, project, of).map_err(failed)?))
+        };
+        Ok((sensing, run))
+    }
+}
+
+/// What presses, and where it is.
+enum PressedBy {
+    Simulated,
+    /// Printer and board.
+    Machine(Address, Address),
+    /// Board.
+    Hand(Address),
+}
+
+/// What whoever presses is told.
+struct OrderInbox {
+    machine: Receiver<BenchOrder>,
+    hand: Receiver<HandOrder>,
+}
+
+impl Bench {
+    /// Orders go to the next run from now on.
+    fn take_orders(&mut self, by_hand: bool) -> OrderInbox {
+        let (to_machine, machine) = channel();
+        let (to_hand, hand) = channel();
+        self.orders = Some(if by_hand {
+            Orders::Hand(to_hand)
+        } else {
+            Orders::Machine(to_machine)
+        });
+        self.paused = false;
+        OrderInbox { machine, hand }
     }
 }
 
 /// Goes through what is left. A job that is ended takes the tip back first.
+fn go_through(
+    run: &PlannedRun,
+    by: &PressedBy,
+    inbox: &OrderInbox,
+    pressing: &Mutex<Option<PressingPlan>>,
+    r: &Reporter,
+) -> anyhow::Result<RunEnd> {
+    match (run, by) {
+        (PlannedRun::Hand(run), PressedBy::Hand(board)) => {
+            press_by_hand(run, board, &inbox.hand, pressing, r)
+        }
+        (PlannedRun::Machine(ready), PressedBy::Machine(printer, board)) => {
+            press(ready, Some((printer, board)), &inbox.machine, pressing, r)
+        }
+        (PlannedRun::Machine(ready), _) => press(ready, None, &inbox.machine, pressing, r),
+        (PlannedRun::Hand(_), _) => anyhow::bail!("name the port of the board that is pressed"),
+    }
+}
+
+/// Says how far a run is, and whether its job was ended.
+fn is_ended(pressing: &Mutex<Option<PressingPlan>>, r: &Reporter) -> bool {
+    let plan = locked(pressing);
+    let [made, failed] = plan.as_ref().map_or([0; 2], PressingPlan::made_and_failed);
+    let total = plan.as_ref().map_or(0, |plan| plan.states.len());
+    drop(plan);
+    let progress = Progress {
+        stage: "Pressing",
+        done: made + failed,
+        total,
+    };
+    r.report(progress).is_break()
+}
+
+/// Somebody goes through what is left.
+fn press_by_hand(
+    run: &HandRun,
+    board: &Address,
+    inbox: &Receiver<HandOrder>,
+    pressing: &Mutex<Option<PressingPlan>>,
+    r: &Reporter,
+) -> anyhow::Result<RunEnd> {
+    /// How often it is asked whether the job was ended.
+    const EVERY: Duration = Duration::from_millis(50);
+    if run.left.is_empty() {
+        return Ok(RunEnd::Finished);
+    }
+    if let Some(plan) = locked(pressing).as_mut() {
+        plan.hand = Some((HandStep::Wait, None));
+    }
+    let (mut stopped, mut asked) = (false, Instant::now());
+    let mut orders = || {
+        // Each time it is asked the window is drawn.
+        let ended = asked.elapsed() > EVERY && {
+            asked = Instant::now();
+            is_ended(pressing, r)
+        };
+        let order = if ended {
+            Some(HandOrder::Stop)
+        } else {
+            inbox.try_recv().ok()
+        };
+        stopped |= order == Some(HandOrder::Stop);
+        order
+    };
+    run.press_at(board.clone(), (&mut orders, false), |says| {
+        if let Some(plan) = locked(pressing).as_mut() {
+            plan.hear_hand(&says, run.meant_n);
+        }
+    })?;
+    Ok(if stopped {
+        RunEnd::Stopped(BY_HAND.into())
+    } else {
+        RunEnd::Finished
+    })
+}
+
+/// A machine goes through what is left.
 fn press(
     ready: &Ready,
-    ports: Option<&(Address, Address)>,
+    ports: Option<(&Address, &Address)>,
     inbox: &Receiver<BenchOrder>,
     pressing: &Mutex<Option<PressingPlan>>,
     r: &Reporter,
@@ -230,15 +351,7 @@ fn press(
     }
     let mut ended = false;
     let mut orders = || {
-        let plan = locked(pressing);
-        let [made, failed] = plan.as_ref().map_or([0; 2], PressingPlan::made_and_failed);
-        drop(plan);
-        let progress = Progress {
-            stage: "Pressing",
-            done: made + failed,
-            total: ready.numbers.len(),
-        };
-        if r.report(progress).is_break() && !std::mem::replace(&mut ended, true) {
+        if is_ended(pressing, r) && !std::mem::replace(&mut ended, true) {
             return Some(BenchOrder::Stop);
         }
         inbox.try_recv().ok()
@@ -252,8 +365,8 @@ fn press(
             plan.hear(news);
         }
     };
-    if let Some((printer, board)) = ports {
-        return ready.press_at(&mut collector, (printer, board), &mut orders, tell);
+    if let Some(ports) = ports {
+        return ready.press_at(&mut collector, ports, &mut orders, tell);
     }
     let watch = |p| r.report(p);
     press_on_simulated(ready, &mut collector, &watch, &mut orders, tell)

@@ -10,6 +10,7 @@ pub mod fields;
 pub mod learned;
 pub mod live;
 pub mod measure;
+pub mod pressing;
 pub mod results;
 pub mod study;
 pub mod touching;

@@ -13,6 +13,7 @@ use crate::link::BenchOrder;
 use crate::mesh::SurfacePoint;
 use crate::project::{ChosenSite, Project, Unit};
 use crate::session::{Desk, Ends, Mishap, Session, Task};
+use crate::test_bed::HandOrder;
 use crate::trade::{TradeConstraint, TradeSetting};
 
 /// Something to be done.
@@ -153,6 +154,8 @@ pub enum BenchAction {
     Plan,
     Press,
     Order(BenchOrder),
+    /// Of whoever presses by hand.
+    Hand(HandOrder),
     /// What was pressed teaches an estimator.
     Learn,
 }
@@ -342,6 +345,7 @@ impl BenchAction {
             Self::Plan => session.plan_presses(),
             Self::Press => session.press_plan(),
             Self::Order(order) => session.order_bench(order),
+            Self::Hand(order) => session.order_hand(order),
             Self::Learn => session.learn_from_presses(),
         }
     }

@@ -1,6 +1,7 @@
 //! The stage “Bench”: what is pressed and by what, and the presses on the limb.
 
 mod form;
+mod hand;
 mod shown;
 
 pub use form::bench_form;

@@ -6,7 +6,7 @@ use super::view::{ScreenWay, Stage, Tool, ViewState};
 use crate::document::Layer;
 use crate::io::examples::Example;
 use crate::render::camera::Preset;
-use crate::session::{Session, Task};
+use crate::session::{HandStep, Session, Task};
 
 /// Everything that can be commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +45,8 @@ pub enum UiCommand {
     PausePresses,
     StopPresses,
     HaltMachine,
+    TakePress,
+    SkipPress,
     Pin,
     RemoveGauges,
     AddHelpful,
@@ -103,6 +105,8 @@ impl UiCommand {
             Self::PausePresses => "Pause pressing",
             Self::StopPresses => "Stop pressing",
             Self::HaltMachine => "Halt the machine",
+            Self::TakePress => "Take this press",
+            Self::SkipPress => "Leave this place out",
             Self::Follow => "Follow changes",
             Self::Pin => "Pin picked gauges",
             Self::RemoveGauges => "Remove picked gauges",
@@ -218,6 +222,10 @@ impl UiCommand {
             Self::HaltMachine => {
                 "Emergency stop: halts the machine where it is (M112). The tip stays where it is"
             }
+            Self::TakePress => {
+                "Write this press down, with the force that is told; where a sensor feels that, presses are taken by themselves"
+            }
+            Self::SkipPress => "Go on with the next place; this one stays to come",
             Self::Follow => "Compute anew what a change has made stale, a draft first; on or off",
             Self::Pin => "Selections must have a gauge there; pinned ones are let go",
             Self::RemoveGauges => "Take the picked gauges away",
@@ -275,6 +283,7 @@ impl UiCommand {
             Self::Tare => plain(Key::F8),
             Self::Record => plain(Key::F9),
             Self::HaltMachine => shifted(Key::X),
+            Self::TakePress => ctrl(Key::Enter),
             Self::Pin => plain(Key::P),
             Self::RemoveGauges => plain(Key::Delete),
             Self::AddHelpful => plain(Key::A),
@@ -320,6 +329,7 @@ impl UiCommand {
             | Self::LearnPresses
             | Self::PausePresses
             | Self::StopPresses
+            | Self::SkipPress
             | Self::DarkLight
             | Self::Paint(_)
             | Self::Stage(_) => None,
@@ -363,6 +373,8 @@ impl UiCommand {
             Self::PausePresses,
             Self::StopPresses,
             Self::HaltMachine,
+            Self::TakePress,
+            Self::SkipPress,
             Self::Pin,
             Self::RemoveGauges,
             Self::AddHelpful,
@@ -403,9 +415,15 @@ pub fn enabled(session: &Session, view: &ViewState, command: UiCommand) -> bool 
             session.bench.is_free()
                 && session.bench.look(|p| p.made_and_failed()[0] > 0) == Some(true)
         }
-        UiCommand::PausePresses | UiCommand::StopPresses | UiCommand::HaltMachine => {
-            session.bench.goes_on()
+        UiCommand::StopPresses => session.bench.goes_on(),
+        UiCommand::PausePresses | UiCommand::HaltMachine => {
+            session.bench.goes_on() && !session.bench.by_hand()
         }
+        UiCommand::TakePress => session.bench.step() == Some(HandStep::TellForce),
+        UiCommand::SkipPress => session
+            .bench
+            .step()
+            .is_some_and(|step| step != HandStep::Wait),
         UiCommand::Export => session.results.design.is_some(),
         UiCommand::MeasureTrade => !session.jobs.runs(Task::Trade),
         UiCommand::Keep => !session.document.state.project.selection.sites.is_empty(),

@@ -13,6 +13,7 @@ use super::palette::Palette;
 use super::scene::PartScene;
 use super::view::{Gesture, Stage, Tab, Tool};
 use crate::link::BenchOrder;
+use crate::test_bed::HandOrder;
 
 /// By how much a key makes the brush wider.
 const BRUSH_STEP: f64 = 1.25;
@@ -162,6 +163,11 @@ fn asked_of_session(command: UiCommand, ask: &mut Ask<'_>, panels: &Panels) -> O
         UiCommand::PausePresses => BenchAction::Order(BenchOrder::Pause).into(),
         UiCommand::StopPresses => BenchAction::Order(BenchOrder::Stop).into(),
         UiCommand::HaltMachine => BenchAction::Order(BenchOrder::Kill).into(),
+        UiCommand::TakePress => {
+            let told = ask.session.desk.bench.told_n;
+            BenchAction::Hand(HandOrder::Force(told)).into()
+        }
+        UiCommand::SkipPress => BenchAction::Hand(HandOrder::Skip).into(),
         UiCommand::Follow => {
             let mut desk = ask.session.desk.clone();
             desk.follow = !desk.follow;

@@ -4,7 +4,7 @@ use egui::{PointerButton, Pos2, Response, Ui};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::action::{BoardAction, Compute, HandAction, History};
+use super::action::{BenchAction, BoardAction, Compute, HandAction, History};
 use super::ask::Ask;
 use super::paint::exaggeration;
 use super::scene::{PartScene, pick_on};
@@ -12,6 +12,7 @@ use super::view::{Field, Gesture, Pane, Stage, Tool, ViewState};
 use crate::document::Brush;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::ChosenSite;
+use crate::test_bed::HandOrder;
 
 /// A click that moves less than this (points) is no drag.
 const TREMBLE: f32 = 4.0;
@@ -158,6 +159,10 @@ fn press(scene: &PartScene, ask: &mut Ask<'_>, pane: Pane, at: Option<Pos2>) {
     if clicks_known_touches(ask) {
         let at = ask.session.document.inputs().part.point(place);
         return ask.act(BoardAction::AskKnownAt(at));
+    }
+    if ask.view.stage == Stage::Bench && ask.session.bench.step().is_some() {
+        let at = ask.session.document.inputs().part.point(place);
+        return ask.act(BenchAction::Hand(HandOrder::Elsewhere(at)));
     }
     ask.act(Compute::Press(place));
     if !matches!(ask.view.field, Field::Strain | Field::Displacement) {

@@ -48,6 +48,18 @@ impl Default for BenchRequest {
     }
 }
 
+impl BenchRequest {
+    /// What is enough (N) unless something else is asked for: a hand presses less hard than a machine.
+    #[must_use]
+    pub fn usual_force(by_hand: bool) -> f64 {
+        if by_hand {
+            10.0
+        } else {
+            PressLimits::default().enough
+        }
+    }
+}
+
 /// What is wrong with a simulated bench: probabilities a line, but for the last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flaws {

@@ -11,10 +11,11 @@ use glam::DVec3;
 use super::places::places;
 use super::ready::pressed;
 use super::run::PressingRun;
-use crate::design::{Inputs, Sensing};
+use crate::design::{Inputs, Sensing, check_on_part};
 use crate::io::bench_folder;
 use crate::link::{Address, ConnectionState, Listener, Recorder, SessionEvent};
 use crate::live::{HandNews, HandPress, HandPresses, Pipeline};
+use crate::plain;
 
 /// What whoever presses may say.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub enum HandOrder {
     Force(f64),
     /// As hard as was meant.
     AsMeant,
+    /// It is pressed there (m) and not where it was asked for.
+    Elsewhere(DVec3),
     /// Leaves this place out for now.
     Skip,
     /// Ends the run; what was pressed is kept.
@@ -32,8 +35,17 @@ pub enum HandOrder {
 /// What whoever presses is told.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HandSays {
-    /// Where to press next: which of how many, and its place (m).
-    Press(usize, usize, DVec3),
+    /// Where to press next (m): its number in the plan, and that it is the `which`-th of all.
+    Press {
+        number: usize,
+        which: usize,
+        all: usize,
+        at: DVec3,
+    },
+    /// It is taken to be pressed there (m).
+    Moved(DVec3),
+    /// Where it is said to be pressed (m) there is no wall.
+    OffTheWall(DVec3),
     /// It was read, and may be let go.
     LetGo,
     /// It is over, and how hard it was is not known yet.
@@ -42,24 +54,54 @@ pub enum HandSays {
     Unsteady,
     /// A force was written, and no press waits for one.
     NothingWaits,
-    /// It is written down, with its force (N) where no sensor feels that.
-    Taken(Option<f64>),
+    /// It is written down: its number in the plan, with its force (N) where no sensor feels that.
+    Taken(usize, Option<f64>),
     /// What the board or the connection says.
     Board(String),
+}
+
+impl HandSays {
+    /// For whoever presses, with the force that is meant (N).
+    #[must_use]
+    pub fn in_words(&self, meant_n: f64) -> String {
+        let place = |at: DVec3| {
+            let mm = at * 1e3;
+            format!("({:.1}, {:.1}, {:.1}) mm", mm.x, mm.y, mm.z)
+        };
+        match self {
+            Self::Press { which, all, at, .. } => format!(
+                "press {which} of {all}: at {} with about {meant_n} N; hold it for a second",
+                place(*at)
+            ),
+            Self::Moved(at) => format!("this one is at {}", place(*at)),
+            Self::OffTheWall(at) => {
+                format!("{} is not on the limb, and was passed over", place(*at))
+            }
+            Self::Board(text) => text.clone(),
+            Self::LetGo => "read: let go".into(),
+            Self::HowHard => format!("how hard was it, in N? (Enter: {meant_n})"),
+            Self::Unsteady => {
+                "it was not taken: leave the limb alone for a moment, then press again and hold it for a second".into()
+            }
+            Self::NothingWaits => "no press waits for a force".into(),
+            Self::Taken(_, Some(force)) => format!("taken, with {force} N"),
+            Self::Taken(_, None) => "taken".into(),
+        }
+    }
 }
 
 /// A run that can be pressed.
 pub struct HandRun {
     /// Where it is written.
     pub folder: PathBuf,
-    /// Where to press (m), by the number in the plan.
-    pub places: Vec<DVec3>,
+    /// Where to press (m) and the wall's normal there, by the number in the plan.
+    pub places: Vec<(DVec3, DVec3)>,
     /// Places that are still to be pressed.
     pub left: Vec<usize>,
     /// Whether a sensor feels how hard it is pressed.
     pub has_sensor: bool,
     /// How hard is meant (N).
-    meant_n: f64,
+    pub meant_n: f64,
     inputs: Inputs,
     sensing: Arc<Sensing>,
 }
@@ -78,12 +120,8 @@ impl HandRun {
             begun,
         } = run;
         let wanted = places(&asked, &folder, &inputs, &sensing, begun)?;
-        let surface = &sensing.drawn.map.mesh;
-        let on_surface = |place: &DVec3| {
-            let (at, _) = surface.index().nearest(*place);
-            (surface.point(at), surface.normal(at))
-        };
-        let planned: Vec<(DVec3, DVec3)> = wanted.iter().map(on_surface).collect();
+        let on_wall = |place: &DVec3| on_wall(&sensing, *place);
+        let planned: Vec<(DVec3, DVec3)> = wanted.iter().map(on_wall).collect();
         if !begun {
             about.write(&folder)?;
             bench_folder::write_plan(&folder, &planned)?;
@@ -91,13 +129,36 @@ impl HandRun {
         let done = pressed(&folder)?;
         Ok(Self {
             left: (0..planned.len()).filter(|k| !done.contains(k)).collect(),
-            places: planned.into_iter().map(|(at, _)| at).collect(),
+            places: planned,
             has_sensor: asked.machine.is_some() && file.machine.sensor.is_some(),
             meant_n: asked.force_n,
             folder,
             inputs,
             sensing,
         })
+    }
+
+    /// In a few words, for people.
+    #[must_use]
+    pub fn in_words(&self) -> Vec<String> {
+        let (all, left) = (self.places.len(), self.left.len());
+        let mut lines = vec![format!(
+            "{} by hand, of about {} N each; how hard they are {}",
+            plain::either(all, "press", "presses"),
+            self.meant_n,
+            if self.has_sensor {
+                "is felt by a sensor"
+            } else {
+                "is told"
+            }
+        )];
+        if left < all {
+            let there = plain::either(all - left, "press is", "presses are");
+            lines.push(format!(
+                "{there} there already; places are those that it was begun with"
+            ));
+        }
+        lines
     }
 
     /// Takes one press after another from a board, until all places are pressed or somebody stops; how many were taken.
@@ -157,6 +218,13 @@ impl HandRun {
     }
 }
 
+/// The place (m) of the wall that is nearest to another, and its normal.
+fn on_wall(sensing: &Sensing, place: DVec3) -> (DVec3, DVec3) {
+    let wall = &sensing.drawn.map.mesh;
+    let (at, _) = wall.index().nearest(place);
+    (wall.point(at), wall.normal(at))
+}
+
 /// Goes through the places, and writes down what is read.
 struct HandDesk<'a> {
     run: &'a HandRun,
@@ -168,6 +236,8 @@ struct HandDesk<'a> {
     prompted: Option<usize>,
     /// A press that is over, until it is known how hard it was.
     over: Option<HandPress>,
+    /// Where this one is pressed (m), if not where it was asked for.
+    elsewhere: Option<DVec3>,
     /// What was said and not obeyed yet.
     order: Option<HandOrder>,
     /// Whether it may be said before its press.
@@ -187,6 +257,7 @@ impl<'a> HandDesk<'a> {
             at: 0,
             prompted: None,
             over: None,
+            elsewhere: None,
             order: None,
             ahead,
             passed: false,
@@ -205,7 +276,12 @@ impl<'a> HandDesk<'a> {
         {
             let all = self.run.places.len();
             let done = all - self.run.left.len() + self.at;
-            tell(HandSays::Press(done + 1, all, self.run.places[number]));
+            tell(HandSays::Press {
+                number,
+                which: done + 1,
+                all,
+                at: self.run.places[number].0,
+            });
         }
     }
 
@@ -250,6 +326,7 @@ impl<'a> HandDesk<'a> {
                 return;
             }
             HandOrder::Skip => return self.go_on(),
+            HandOrder::Elsewhere(place) => return self.move_to(place, tell),
             HandOrder::Force(force) => force,
             HandOrder::AsMeant => self.run.meant_n,
         };
@@ -263,8 +340,19 @@ impl<'a> HandDesk<'a> {
         }
     }
 
+    fn move_to(&mut self, place: DVec3, tell: &mut dyn FnMut(HandSays)) {
+        self.order = None;
+        let part = &self.run.inputs.part;
+        if check_on_part(part, "place", std::iter::once(place)).is_err() {
+            return tell(HandSays::OffTheWall(place));
+        }
+        let (at, _) = on_wall(&self.run.sensing, place);
+        self.elsewhere = Some(at);
+        tell(HandSays::Moved(at));
+    }
+
     fn go_on(&mut self) {
-        (self.over, self.order) = (None, None);
+        (self.over, self.order, self.elsewhere) = (None, None, None);
         self.passed = self.presses.is_felt();
         self.at += 1;
     }
@@ -274,7 +362,7 @@ impl<'a> HandDesk<'a> {
         let (Some(press), Some(&number)) = (self.over.take(), self.run.left.get(self.at)) else {
             return;
         };
-        let mm = self.run.places[number] * 1e3;
+        let mm = self.elsewhere.unwrap_or(self.run.places[number].0) * 1e3;
         let recorder = &mut self.recorder;
         recorder.own(&format!(
             "press {number} {:.4} {:.4} {:.4}",
@@ -293,7 +381,7 @@ impl<'a> HandDesk<'a> {
         recorder.own(&format!("pressed {number}"));
         recorder.flush();
         self.taken += 1;
-        tell(HandSays::Taken(force));
+        tell(HandSays::Taken(number, force));
         self.go_on();
     }
 }

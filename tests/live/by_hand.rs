@@ -22,10 +22,17 @@ fn force(number: usize) -> f64 {
 
 /// A board that is pressed at some of the places, one after another, and its port.
 fn pressed(folder: &Path, places: &[DVec3], numbers: std::ops::Range<usize>) -> (Running, String) {
-    let path = folder.join(format!("from-{}.csv", numbers.start));
+    let name = format!("from-{}", numbers.start);
+    let presses: Vec<(DVec3, f64)> = numbers.map(|k| (places[k], force(k))).collect();
+    pressed_at(folder, &name, &presses)
+}
+
+/// A board that is pressed somewhere (mm) and so hard (N), and again elsewhere, and its port.
+pub fn pressed_at(folder: &Path, name: &str, presses: &[(DVec3, f64)]) -> (Running, String) {
+    let path = folder.join(format!("{name}.csv"));
     let mut text = String::from("start_s,duration_s,x_mm,y_mm,z_mm,force_n\n");
-    for (k, number) in numbers.enumerate() {
-        let (start, p, force) = (FIRST_S + EVERY_S * k as f64, places[number], force(number));
+    for (k, (p, force)) in presses.iter().enumerate() {
+        let start = FIRST_S + EVERY_S * k as f64;
         let _ = writeln!(
             text,
             "{start:.2},1.3,{:.3},{:.3},{:.3},{force}",
@@ -123,15 +130,27 @@ fn presses_by_hand_are_collected_stopped_and_gone_on_with() {
     drop(board);
 
     let (_board, port) = pressed(folder.path(), &places, FIRST..ALL);
-    // Words that are neither are passed over.
-    let typed = format!("perhaps\n{}", typed(FIRST..ALL, ""));
+    // Words that are neither are passed over; the last place is not pressed where it was asked for.
+    let last = places[ALL - 1];
+    let typed = format!(
+        "perhaps\n{}at 900 0 0\nat {:.3} {:.3} {:.3}\n{}",
+        typed(FIRST..ALL - 1, ""),
+        last.x,
+        last.y,
+        last.z - 3.0,
+        typed(ALL - 1..ALL, "")
+    );
     let (said, words) = collect(&project, &run, &points, &port, &typed);
     assert_eq!(said["pressed"], ALL, "{words}");
     assert!(
-        words.contains("“perhaps” is no force and no order"),
+        words.contains("“perhaps” is no force, no place and no order"),
         "{words}"
     );
     assert!(words.contains("press 4 of 8: at"), "{words}");
+    assert!(
+        words.contains("(900.0, 0.0, 0.0) mm is not on the limb"),
+        "{words}"
+    );
 
     let table = at("d.csv");
     let out = at("d.npz");
@@ -168,4 +187,7 @@ fn presses_by_hand_are_collected_stopped_and_gone_on_with() {
         assert!(nearest == Some(k) && far(&places[k]) < 10.0, "{rows:?}");
         assert!((n - force(k)).abs() < 1e-9, "{rows:?}");
     }
+    let [x, y, z, _] = rows[ALL - 1];
+    let moved = format!("this one is at ({x:.1}, {y:.1}, {z:.1}) mm");
+    assert!(words.contains(&moved), "{moved}: {words}");
 }

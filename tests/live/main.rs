@@ -8,6 +8,7 @@ mod window;
 
 mod board;
 mod by_hand;
+mod by_hand_window;
 mod calibrate;
 mod display;
 mod ends;

@@ -110,7 +110,8 @@ pub struct FaultArgs {
 impl CollectArgs {
     /// See [`Self::force`].
     pub(super) fn force_n(&self) -> f64 {
-        self.force.unwrap_or(if self.by_hand { 10.0 } else { 25.0 })
+        self.force
+            .unwrap_or(BenchRequest::usual_force(self.by_hand))
     }
 
     /// What is asked of the run.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
 use anyhow::{Context as _, ensure};
+use glam::DVec3;
 use serde_json::json;
 
 use super::CollectArgs;
@@ -13,6 +14,9 @@ use crate::design::{Inputs, Sensing};
 use crate::link::{Address, Pace};
 use crate::plain;
 use crate::test_bed::{HandOrder, HandRun, HandSays, PressingRun, pressed};
+
+/// Nobody presses harder (N).
+const HARDEST_N: f64 = 1e4;
 
 /// Presses what is left of a run.
 pub fn run(
@@ -57,32 +61,19 @@ fn board(args: &CollectArgs) -> anyhow::Result<Address> {
 }
 
 fn say(says: &HandSays, meant_n: f64) {
+    let words = says.in_words(meant_n);
     out::say(&match says {
-        HandSays::Press(which, all, at) => {
-            let p = *at * 1e3;
-            format!(
-                "press {which} of {all}: at ({:.1}, {:.1}, {:.1}) mm with about {meant_n} N; hold it for a second",
-                p.x, p.y, p.z
-            )
-        }
-        HandSays::LetGo => "read: let go".to_owned(),
-        HandSays::HowHard => format!("how hard was it, in N? (Enter: {meant_n})"),
-        HandSays::Unsteady => {
-            "it was not taken: leave the limb alone for a moment, then press again and hold it for a second".to_owned()
-        }
-        HandSays::NothingWaits => "no press waits for a force".to_owned(),
-        HandSays::Taken(Some(force)) => format!("taken, with {force} N"),
-        HandSays::Taken(None) => "taken".to_owned(),
-        HandSays::Board(text) => format!("hapdef: {text}"),
+        HandSays::Board(_) => format!("hapdef: {words}"),
+        _ => words,
     });
 }
 
 /// What is typed, a line each.
 fn typed(run: &HandRun) -> Receiver<HandOrder> {
     out::say(if run.has_sensor {
-        "write skip or stop and press Enter"
+        "write skip, stop, or at X Y Z (mm) where you press elsewhere, and press Enter"
     } else {
-        "write how hard each press was (N), skip or stop, and press Enter"
+        "write how hard each press was (N), skip, stop, or at X Y Z (mm) where you pressed elsewhere, and press Enter"
     });
     let (orders, inbox) = channel();
     // Without a thread there are no orders, and every press is as hard as is meant.
@@ -93,23 +84,37 @@ fn typed(run: &HandRun) -> Receiver<HandOrder> {
 }
 
 fn read_lines(orders: &Sender<HandOrder>) {
-    /// Nobody presses harder (N).
-    const HARDEST: f64 = 1e4;
     for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-        let order = match line.trim() {
-            "" => HandOrder::AsMeant,
-            "skip" => HandOrder::Skip,
-            "stop" => HandOrder::Stop,
-            other => match other.trim_end_matches(['N', ' ']).parse::<f64>() {
-                Ok(force) if force > 0.0 && force <= HARDEST => HandOrder::Force(force),
-                _ => {
-                    out::say(&format!("{} is no force and no order", plain::quote(other)));
-                    continue;
-                }
-            },
+        let Some(order) = order_of(line.trim()) else {
+            let line = plain::quote(line.trim());
+            out::say(&format!("{line} is no force, no place and no order"));
+            continue;
         };
         if orders.send(order).is_err() {
             return;
+        }
+    }
+}
+
+fn order_of(line: &str) -> Option<HandOrder> {
+    if let Some(place) = line.strip_prefix("at ") {
+        let numbers: Vec<f64> = place
+            .split([' ', ','])
+            .filter(|word| !word.is_empty())
+            .map(|word| word.parse().ok().filter(|mm: &f64| mm.is_finite()))
+            .collect::<Option<_>>()?;
+        let &[x, y, z] = &numbers[..] else {
+            return None;
+        };
+        return Some(HandOrder::Elsewhere(DVec3::new(x, y, z) * 1e-3));
+    }
+    match line {
+        "" => Some(HandOrder::AsMeant),
+        "skip" => Some(HandOrder::Skip),
+        "stop" => Some(HandOrder::Stop),
+        force => {
+            let force: f64 = force.trim_end_matches(['N', ' ']).parse().ok()?;
+            (force > 0.0 && force <= HARDEST_N).then_some(HandOrder::Force(force))
         }
     }
 }

@@ -1,14 +1,14 @@
-//! A run of the test-bed: what is planned of it, how each press stands, and who gives it orders.
+//! The bench: what is asked of it, its plan, and who gives orders to whoever goes through that.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::bench::{CollectorNews, RunEnd};
+use super::pressing::{HandStep, PressingPlan};
 use crate::document::SensingInputs;
 use crate::link::BenchOrder;
-use crate::test_bed::{BenchRequest, Ready};
+use crate::test_bed::{BenchRequest, HandOrder};
 
 /// What is typed at the bench, none of it a project's.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +24,8 @@ pub struct BenchDesk {
     pub printer: String,
     pub board: String,
     pub printer_baud: u32,
+    /// How hard the last press by hand was (N), where that is told.
+    pub told_n: f64,
 }
 
 impl Default for BenchDesk {
@@ -40,6 +42,7 @@ impl Default for BenchDesk {
             printer: String::new(),
             board: String::new(),
             printer_baud: crate::link::BAUD,
+            told_n: BenchRequest::default().force_n,
         }
     }
 }
@@ -52,134 +55,17 @@ pub struct PlanInputs {
     pub folder: PathBuf,
 }
 
-/// How a press stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum PressState {
-    ToCome,
-    Now,
-    Made,
-    Failed(String),
-}
-
-/// A plan, and how far it has come.
-pub struct PressingPlan {
-    pub inputs: PlanInputs,
-    pub ready: Arc<Ready>,
-    /// In the order of its presses.
-    pub states: Vec<PressState>,
-    /// What was last said of it, the newest last.
-    pub said: Vec<String>,
-    /// Of what was pressed: that which is pressed again and again is pressed just now.
-    pub checking: bool,
-    /// How many of them are made, and how many failed: asked at every look of whoever presses.
-    counts: [usize; 2],
-}
-
-impl PressingPlan {
-    /// How many words of it are kept.
-    const SAID: usize = 6;
-
-    pub(in crate::session) fn new(inputs: PlanInputs, ready: Arc<Ready>) -> Self {
-        let state = |number: &usize| {
-            if ready.done.contains(number) {
-                PressState::Made
-            } else {
-                PressState::ToCome
-            }
-        };
-        let states: Vec<PressState> = ready.numbers.iter().map(state).collect();
-        let made = states.iter().filter(|s| **s == PressState::Made).count();
-        Self {
-            inputs,
-            states,
-            said: Vec::new(),
-            checking: false,
-            counts: [made, 0],
-            ready,
-        }
-    }
-
-    /// Presses that were made, and that failed.
-    #[must_use]
-    pub fn made_and_failed(&self) -> [usize; 2] {
-        self.counts
-    }
-
-    pub(in crate::session) fn say(&mut self, text: impl Into<String>) {
-        self.said.push(text.into());
-        if self.said.len() > Self::SAID {
-            self.said.remove(0);
-        }
-    }
-
-    fn set(&mut self, number: usize, state: PressState) {
-        // Numbers rise with the order of the presses.
-        if let Ok(k) = self.ready.numbers.binary_search(&number) {
-            let counted = |state: &PressState| match state {
-                PressState::Made => Some(0),
-                PressState::Failed(_) => Some(1),
-                PressState::ToCome | PressState::Now => None,
-            };
-            if let Some(kind) = counted(&self.states[k]) {
-                self.counts[kind] -= 1;
-            }
-            if let Some(kind) = counted(&state) {
-                self.counts[kind] += 1;
-            }
-            self.states[k] = state;
-        }
-    }
-
-    /// Nothing is pressed just now.
-    fn let_go(&mut self) {
-        self.checking = false;
-        for state in &mut self.states {
-            if *state == PressState::Now {
-                *state = PressState::ToCome;
-            }
-        }
-    }
-
-    pub(in crate::session) fn hear(&mut self, news: CollectorNews) {
-        match news {
-            CollectorNews::Begun(number) => {
-                self.let_go();
-                match number {
-                    Some(number) => self.set(number, PressState::Now),
-                    None => self.checking = true,
-                }
-            }
-            CollectorNews::Press { number, failed } => {
-                let state = failed.map_or(PressState::Made, PressState::Failed);
-                self.set(number, state);
-            }
-            CollectorNews::Discarded(numbers) => {
-                for number in numbers {
-                    self.set(number, PressState::ToCome);
-                }
-            }
-            CollectorNews::Say(text) => self.say(text),
-            CollectorNews::Answer(_)
-            | CollectorNews::Note(_)
-            | CollectorNews::Keep
-            | CollectorNews::Waits => {}
-        }
-    }
-
-    pub(in crate::session) fn end(&mut self, ended: &RunEnd) {
-        self.let_go();
-        match ended {
-            RunEnd::Finished => self.say("all presses were tried"),
-            RunEnd::Stopped(why) => self.say(why),
-        }
-    }
+/// To whoever presses: a machine or somebody.
+pub(in crate::session) enum Orders {
+    Machine(Sender<BenchOrder>),
+    Hand(Sender<HandOrder>),
 }
 
 /// The bench: its plan, shared with whoever goes through it, and who gives that orders.
 #[derive(Default)]
 pub struct Bench {
     pub(in crate::session) pressing: Arc<Mutex<Option<PressingPlan>>>,
-    pub(in crate::session) orders: Option<Sender<BenchOrder>>,
+    pub(in crate::session) orders: Option<Orders>,
     pub paused: bool,
     /// Whether a run is made ready or pressed: until its thread has ended, whatever has become of its job.
     pub(in crate::session) runs: Arc<AtomicBool>,
@@ -220,6 +106,19 @@ impl Bench {
         self.runs.load(Ordering::SeqCst)
     }
 
+    /// Whether somebody presses by hand.
+    #[must_use]
+    pub fn by_hand(&self) -> bool {
+        self.goes_on() && matches!(self.orders, Some(Orders::Hand(_)))
+    }
+
+    /// What whoever presses by hand is to do next.
+    #[must_use]
+    pub fn step(&self) -> Option<HandStep> {
+        let hand = self.look(|plan| plan.hand).flatten();
+        hand.filter(|_| self.by_hand()).map(|(step, _)| step)
+    }
+
     /// Whether another run or plan may begin.
     #[must_use]
     pub fn is_free(&self) -> bool {
@@ -233,8 +132,19 @@ impl Bench {
             BenchOrder::Resume => self.paused = false,
             BenchOrder::Stop | BenchOrder::Kill | BenchOrder::More(_) | BenchOrder::GiveUp(_) => {}
         }
-        if let Some(orders) = &self.orders {
-            // Nobody is there any more to be told once it has ended.
+        // Nobody is there any more to be told once it has ended.
+        let _ = match (&self.orders, order) {
+            (Some(Orders::Machine(orders)), order) => orders.send(order).is_ok(),
+            (Some(Orders::Hand(orders)), BenchOrder::Stop | BenchOrder::Kill) => {
+                orders.send(HandOrder::Stop).is_ok()
+            }
+            _ => false,
+        };
+    }
+
+    /// Tells whoever presses by hand.
+    pub(in crate::session) fn order_hand(&self, order: HandOrder) {
+        if let Some(Orders::Hand(orders)) = &self.orders {
             let _ = orders.send(order);
         }
     }

@@ -4,15 +4,54 @@ use egui::{Color32, DragValue, RichText, TextEdit, Ui};
 
 use super::super::ask::Ask;
 use super::super::commands::UiCommand;
-use super::super::form::{counted, quantity, rows};
+use super::super::form::{choice, counted, quantity, rows};
 use super::super::learned::estimator_shown;
 use super::super::theme;
+use super::hand::hand_form;
 use crate::plain;
 use crate::session::{BenchDesk, PressState, PressingPlan};
 use crate::test_bed::{BenchRequest, Flaws};
 
 /// Failed presses that are named.
 const NAMED: usize = 5;
+
+/// What goes through the plan.
+#[derive(Clone, Copy, PartialEq)]
+enum Presser {
+    Simulated,
+    Machine,
+    Hand,
+}
+
+impl Presser {
+    const ALL: [Self; 3] = [Self::Simulated, Self::Machine, Self::Hand];
+
+    fn of(asked: &BenchRequest) -> Self {
+        match (asked.by_hand, &asked.simulated) {
+            (true, _) => Self::Hand,
+            (false, Some(_)) => Self::Simulated,
+            (false, None) => Self::Machine,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Simulated => "A simulated bench",
+            Self::Machine => "A machine",
+            Self::Hand => "Somebody's hand",
+        }
+    }
+
+    fn put(self, asked: &mut BenchRequest) {
+        let usual = |asked: &BenchRequest| BenchRequest::usual_force(asked.by_hand);
+        let as_usual = (asked.force_n - usual(asked)).abs() < 1e-9;
+        asked.by_hand = self == Self::Hand;
+        if as_usual {
+            asked.force_n = usual(asked);
+        }
+        asked.simulated = (self == Self::Simulated).then(Flaws::default);
+    }
+}
 
 /// The settings, the orders, and what came of them.
 pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -21,7 +60,7 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
         ask.edit_desk(|desk| {
             let baud = &mut desk.baud;
             let desk = &mut desk.bench;
-            machine_rows(ui, desk, baud);
+            presser_rows(ui, desk, baud);
             press_rows(ui, &mut desk.asked);
             file_rows(ui, desk);
         });
@@ -33,14 +72,10 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
         ask.button(ui, UiCommand::PlanPresses);
         ask.button(ui, UiCommand::PressPlan);
     });
-    ui.horizontal_wrapped(|ui| {
-        ask.button(ui, UiCommand::PausePresses);
-        ask.button(ui, UiCommand::StopPresses);
-    });
-    halt_button(ask, ui);
+    order_buttons(ask, ui);
     ui.add_space(6.0);
     if ask.session.bench.look(|plan| progress(ui, plan)).is_none() {
-        ui.weak("Nothing is planned yet. “Plan presses” shows on the limb what the machine gets to; nothing moves before “Press the plan”");
+        ui.weak("Nothing is planned yet. “Plan presses” shows on the limb where will be pressed; nothing moves before “Press the plan”");
     } else if !ask.session.plan_holds() && !goes_on {
         let text = "The plan is of other settings or gauges: plan anew";
         ui.colored_label(theme::STALE, text);
@@ -50,6 +85,20 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
     if let Some(learnt) = ask.session.learnt() {
         estimator_shown(ui, learnt);
     }
+}
+
+/// What a run that goes on is told.
+fn order_buttons(ask: &mut Ask<'_>, ui: &mut Ui) {
+    if Presser::of(&ask.session.desk.bench.asked) == Presser::Hand {
+        hand_form(ask, ui);
+        ask.button(ui, UiCommand::StopPresses);
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ask.button(ui, UiCommand::PausePresses);
+        ask.button(ui, UiCommand::StopPresses);
+    });
+    halt_button(ask, ui);
 }
 
 /// The emergency stop, which must be found without looking for it.
@@ -76,26 +125,34 @@ fn halt_button(ask: &mut Ask<'_>, ui: &mut Ui) {
     }
 }
 
-fn machine_rows(ui: &mut Ui, desk: &mut BenchDesk, baud: &mut u32) {
-    rows(ui, "Machine", |ui| {
-        text_row(ui, "Machine file", &mut desk.machine, "the paper's bench");
-        let mut simulated = desk.asked.simulated.is_some();
-        let name = ui.label("Simulated");
-        ui.checkbox(&mut simulated, "")
-            .on_hover_text("Printer, limb as a workshop builds it, and board are computed, as fast as that goes")
-            .labelled_by(name.id)
-            .accessible_name("Simulated bench");
-        ui.end_row();
-        if simulated != desk.asked.simulated.is_some() {
-            desk.asked.simulated = simulated.then(Flaws::default);
+fn presser_rows(ui: &mut Ui, desk: &mut BenchDesk, baud: &mut u32) {
+    rows(ui, "Pressed by", |ui| {
+        let mut presser = Presser::of(&desk.asked);
+        let help = "Printer, limb as a workshop builds it and board may all be computed, as fast as that goes; or a printer presses; or you do, where the limb shows it";
+        choice(
+            ui,
+            "Who presses",
+            &mut presser,
+            &Presser::ALL,
+            Presser::name,
+            help,
+        );
+        if presser != Presser::of(&desk.asked) {
+            presser.put(&mut desk.asked);
         }
-        if simulated {
-            return;
+        if presser == Presser::Hand {
+            text_row(ui, "Force sensor", &mut desk.machine, "none: a scale tells");
+        } else {
+            text_row(ui, "Machine file", &mut desk.machine, "the paper's bench");
         }
-        text_row(ui, "Printer", &mut desk.printer, "port or host:port");
-        baud_row(ui, "Printer's baud", &mut desk.printer_baud);
-        text_row(ui, "Board", &mut desk.board, "port or host:port");
-        baud_row(ui, "Board's baud", baud);
+        if presser == Presser::Machine {
+            text_row(ui, "Printer", &mut desk.printer, "port or host:port");
+            baud_row(ui, "Printer's baud", &mut desk.printer_baud);
+        }
+        if presser != Presser::Simulated {
+            text_row(ui, "Board", &mut desk.board, "port or host:port");
+            baud_row(ui, "Board's baud", baud);
+        }
     });
 }
 
@@ -125,38 +182,48 @@ fn press_rows(ui: &mut Ui, asked: &mut BenchRequest) {
             1..=100_000,
             "Evenly over what touches get to",
         );
-        let mut length = |label, value: &mut f64, range, help| {
-            quantity(ui, label, value, range, 0.01, "mm", help);
-        };
-        length(
-            "Step",
-            &mut asked.step_mm,
-            0.01..=5.0,
-            "Between two readings",
-        );
-        length(
-            "Depth",
-            &mut asked.depth_mm,
-            0.01..=50.0,
-            "From where a place is first felt",
-        );
-        let mut force = |label, value: &mut f64, help| {
-            quantity(ui, label, value, 0.1..=1e4, 0.5, "N", help);
-        };
-        force("Enough", &mut asked.force_n, "The force that is enough");
-        force(
-            "At most",
-            &mut asked.most_force_n,
-            "The force at which the machine stops and takes its tip back",
-        );
-        counted(
-            ui,
-            "Check after",
-            &mut asked.check,
-            0..=100_000,
-            "Presses between two of one place that is pressed again and again, so that lost steps are noticed; 0 for never",
-        );
+        if asked.by_hand {
+            force_row(ui, "About", &mut asked.force_n, "How hard is meant");
+        } else {
+            machine_press_rows(ui, asked);
+        }
     });
+}
+
+fn force_row(ui: &mut Ui, label: &str, value: &mut f64, help: &str) {
+    quantity(ui, label, value, 0.1..=1e4, 0.5, "N", help);
+}
+
+fn machine_press_rows(ui: &mut Ui, asked: &mut BenchRequest) {
+    let mut length = |label, value: &mut f64, range, help| {
+        quantity(ui, label, value, range, 0.01, "mm", help);
+    };
+    length(
+        "Step",
+        &mut asked.step_mm,
+        0.01..=5.0,
+        "Between two readings",
+    );
+    length(
+        "Depth",
+        &mut asked.depth_mm,
+        0.01..=50.0,
+        "From where a place is first felt",
+    );
+    force_row(ui, "Enough", &mut asked.force_n, "The force that is enough");
+    force_row(
+        ui,
+        "At most",
+        &mut asked.most_force_n,
+        "The force at which the machine stops and takes its tip back",
+    );
+    counted(
+        ui,
+        "Check after",
+        &mut asked.check,
+        0..=100_000,
+        "Presses between two of one place that is pressed again and again, so that lost steps are noticed; 0 for never",
+    );
 }
 
 fn file_rows(ui: &mut Ui, desk: &mut BenchDesk) {
@@ -180,10 +247,9 @@ fn progress(ui: &mut Ui, plan: &PressingPlan) {
     let wrapped = |ui: &mut Ui, text: String| {
         ui.add(egui::Label::new(RichText::new(text).size(11.5).weak()).wrap());
     };
-    for line in plan.ready.in_words() {
+    for line in plan.run.in_words() {
         wrapped(ui, line);
     }
-    wrapped(ui, plan.ready.checked_in_words());
     for line in &plan.said {
         ui.add(egui::Label::new(line).wrap());
     }

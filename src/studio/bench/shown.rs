@@ -6,8 +6,8 @@ use glam::DVec3;
 use super::super::paint::{LimbLook, label};
 use super::super::theme;
 use super::super::view::{Pane, Stage};
-use crate::bench::Planned;
-use crate::session::{PressState, PressingPlan};
+use crate::session::{PlannedRun, PressState, PressingPlan};
+use crate::test_bed::Ready;
 
 const TO_COME: Color32 = Color32::from_rgb(222, 226, 232);
 /// Told apart from what failed by shape, too.
@@ -22,8 +22,10 @@ pub fn paint_bench(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
         return;
     }
     let drawn = look.session.bench.look(|plan| {
-        if pane == Pane::Limb {
-            paint_table(look, painter, plan);
+        if pane == Pane::Limb
+            && let PlannedRun::Machine(ready) = &plan.run
+        {
+            paint_table(look, painter, ready);
         }
         paint_presses(look, painter, pane, plan);
     });
@@ -36,17 +38,38 @@ fn paint_presses(look: LimbLook<'_>, painter: &Painter, pane: Pane, plan: &Press
     let toward = look.view.camera.toward_eye();
     let place = look.scene.placing(look.view, pane);
     let rect = look.view.rect_of(pane);
-    for (press, state) in plan.ready.reach.presses.iter().zip(&plan.states) {
+    let seen = |at: DVec3, normal: DVec3| {
         // What lies on the other side is behind the wall.
-        let faces = pane == Pane::Unrolled || press.normal.dot(toward) > 0.0;
-        let at = place(press.at).filter(|at| faces && rect.contains(*at));
-        let Some(at) = at else {
+        let faces = pane == Pane::Unrolled || normal.dot(toward) > 0.0;
+        place(at).filter(|at| faces && rect.contains(*at))
+    };
+    for (number, (&(at, normal), state)) in plan.places.iter().zip(&plan.states).enumerate() {
+        let Some(at) = seen(at, normal) else {
             continue;
         };
         match state {
-            PressState::Now => paint_now(look, painter, pane, plan, press, at),
+            PressState::Now => paint_now(look, painter, pane, (plan, number), at),
             state => paint_press(painter, at, state),
         }
+    }
+    if let Some((_, Some(moved))) = plan.hand {
+        paint_moved(look, painter, pane, moved);
+    }
+}
+
+/// Where somebody says that the press of now is, if not where it was asked for.
+fn paint_moved(look: LimbLook<'_>, painter: &Painter, pane: Pane, moved: DVec3) {
+    if let Some(at) = look.scene.placing(look.view, pane)(moved) {
+        let edge = Stroke::new(1.5, Color32::BLACK);
+        painter.circle(at, 2.0 * DOT, theme::TOUCHED, edge);
+        let beside = at + vec2(3.0 * DOT, 0.0);
+        label(
+            painter,
+            beside,
+            Align2::LEFT_CENTER,
+            "pressed here",
+            theme::TOUCHED,
+        );
     }
 }
 
@@ -76,10 +99,13 @@ fn paint_now(
     look: LimbLook<'_>,
     painter: &Painter,
     pane: Pane,
-    plan: &PressingPlan,
-    press: &Planned,
+    (plan, number): (&PressingPlan, usize),
     at: Pos2,
 ) {
+    let moved = matches!(plan.hand, Some((_, Some(_))));
+    if moved {
+        return paint_press(painter, at, &PressState::ToCome);
+    }
     painter.circle(
         at,
         2.0 * DOT,
@@ -89,20 +115,25 @@ fn paint_now(
     if pane == Pane::Unrolled {
         return;
     }
-    let ready = &plan.ready;
-    let from = ready.mount.turn.transpose() * press.pose.from();
+    let (place, normal) = plan.places[number];
+    let from = match &plan.run {
+        PlannedRun::Machine(ready) => {
+            ready.mount.turn.transpose() * ready.reach.presses[number].pose.from()
+        }
+        PlannedRun::Hand(_) => normal,
+    };
     let length = 0.16 * look.view.camera.distance;
-    if let Some(tail) = look.view.place(press.at + from * length) {
+    if let Some(tail) = look.view.place(place + from * length) {
         painter.arrow(tail, at - tail, Stroke::new(5.0, Color32::BLACK));
         painter.arrow(tail, at - tail, Stroke::new(3.0, theme::TOUCHED));
     }
 }
 
 /// The axis that the machine turns the limb about, and where its tip comes from at angle zero: how the limb stands in it.
-fn paint_table(look: LimbLook<'_>, painter: &Painter, plan: &PressingPlan) {
+fn paint_table(look: LimbLook<'_>, painter: &Painter, ready: &Ready) {
     /// Of the axis beyond the limb, over its length.
     const BEYOND: f64 = 0.12;
-    let mount = &plan.ready.mount;
+    let mount = &ready.mount;
     let part = &look.session.document.part;
     let heights = part.positions().iter().map(|&p| mount.place(p).z);
     let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| {
@@ -122,7 +153,7 @@ fn paint_table(look: LimbLook<'_>, painter: &Painter, plan: &PressingPlan) {
         );
     }
     // Beside the limb's middle, where it is in nobody's way.
-    let reach = plan.ready.reach.retreat;
+    let reach = ready.reach.retreat;
     let zero = [1.3 * reach, 1.05 * reach].map(|x| at(x, f64::midpoint(low, high)));
     if let [Some(tail), Some(tip)] = zero {
         let tail = look.view.rect.shrink2(vec2(60.0, 48.0)).clamp(tail);
