@@ -6,7 +6,8 @@ struct Scene {
     target_scale: vec4f, // xyz: target (m), w: 1 / distance
     deform: vec4f,     // x: exaggeration, y: 1 when a field is shown, z: 1 when the region is shown
     section: vec4f,    // what lies on the positive side of this plane is cut away, relative units
-    look: vec4f,       // x: how much a wall in front covers, y: 1 when the first layer marks what is blind
+    // x: how much a wall in front covers, y: 1 when the first layer marks what is blind, z: how much an edge covers
+    look: vec4f,
     up: vec4f,         // xyz: up, w: the stretch above which lengths are marked as off, 0 for none
 };
 
@@ -92,6 +93,20 @@ fn colour(f: Fragment, front: bool) -> vec3f {
 fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     if (dot(scene.section, vec4f(f.world, 1.0)) > 0.0) { discard; }
     return vec4f(colour(f, front), 1.0);
+}
+
+// Rims and sharp edges, a little nearer to the eye than the walls that they bound.
+@vertex
+fn vs_edge(v: Vertex) -> Fragment {
+    var f = vs(v);
+    f.clip.z -= 0.00006 * f.clip.w;
+    return f;
+}
+
+@fragment
+fn fs_edge(f: Fragment) -> @location(0) vec4f {
+    if (dot(scene.section, vec4f(f.world, 1.0)) > 0.0) { discard; }
+    return vec4f(vec3f(0.03), 1.0) * scene.look.z;
 }
 
 // A wall in front of what is behind it, colour times cover.

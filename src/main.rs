@@ -83,9 +83,9 @@ fn open_studio(cli: &Cli) -> anyhow::Result<()> {
 
 #[cfg(feature = "studio")]
 fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
-    use cli::render::ViewArg;
+    use cli::render::{BackdropArg, ViewArg};
     use hapdef::render::camera::Preset;
-    use hapdef::studio::picture::{Picture, png, turning};
+    use hapdef::studio::picture::{Backdrop, Picture, png, turning};
 
     let picture = Picture {
         size: args.size.0,
@@ -98,7 +98,11 @@ fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
             ViewArg::Top => Some(Preset::Top),
             ViewArg::Bottom => Some(Preset::Bottom),
         },
-        transparent: args.transparent,
+        backdrop: match (args.transparent, args.backdrop) {
+            (true, _) => Backdrop::Transparent,
+            (false, BackdropArg::Dark) => Backdrop::Dark,
+            (false, BackdropArg::Neutral) => Backdrop::Neutral,
+        },
     };
     let loaded = args.common().load()?;
     cli::spared::Spared::of(&loaded).check_result("--out", Some(&args.out))?;

@@ -2,6 +2,8 @@
 
 pub mod camera;
 #[cfg(feature = "studio")]
+pub mod floor;
+#[cfg(feature = "studio")]
 pub mod gpu;
 #[cfg(feature = "studio")]
 pub mod offscreen;

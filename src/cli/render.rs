@@ -17,8 +17,11 @@ pub struct RenderArgs {
     /// Width and height in pixels, such as 3840x2160.
     #[arg(long, default_value = "1920x1080")]
     pub size: Size,
+    /// What is behind the limb.
+    #[arg(long, value_enum, default_value_t)]
+    pub backdrop: BackdropArg,
     /// Leave the background transparent.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "backdrop")]
     pub transparent: bool,
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
@@ -50,6 +53,15 @@ pub enum ViewArg {
     Right,
     Top,
     Bottom,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, Default)]
+pub enum BackdropArg {
+    /// As the window at night.
+    #[default]
+    Dark,
+    /// A light grey that prints well.
+    Neutral,
 }
 
 /// Width and height in pixels.

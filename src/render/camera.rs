@@ -139,6 +139,12 @@ impl Camera {
         perspective(FOV as f32, aspect, 0.02, 20.0) * view
     }
 
+    /// Pixels of one unit at the distance one, in a view so many pixels high.
+    #[must_use]
+    pub fn scale(&self, height: u32) -> f32 {
+        (f64::from(height) / 2.0 / (FOV / 2.0).tan()) as f32
+    }
+
     /// Where points appear in a view, for many of them.
     #[must_use]
     pub fn projection(&self, aspect: f32) -> Projection {

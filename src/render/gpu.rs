@@ -3,6 +3,7 @@
 
 mod data;
 mod pipelines;
+mod shade;
 
 use std::sync::Arc;
 
@@ -11,7 +12,10 @@ use eframe::wgpu::{self, util::DeviceExt};
 
 pub use self::data::{GpuVertex, Shown, Solid, Uniforms};
 use self::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES, layout};
+use self::shade::{ShadePipelines, ShadeTargets};
+pub use self::shade::{ShadeUniforms, Shading};
 use crate::colormap::{ColorMap, TABLE};
+use crate::render::floor::FloorShadow;
 use crate::tally::{self, Done};
 
 /// Pictures that a window shows side by side, each with a target of its own.
@@ -29,6 +33,7 @@ pub struct Frame3d {
     pub shown: Arc<Vec<Shown>>,
     pub map: ColorMap,
     pub uniforms: Uniforms,
+    pub shading: Shading,
     /// Red, green, blue, alpha, 0–1.
     pub background: [f64; 4],
     /// In pixels.
@@ -38,6 +43,7 @@ pub struct Frame3d {
 /// Everything on the graphics adapter.
 pub struct SceneGpu {
     pipelines: Pipelines,
+    shades: ShadePipelines,
     scene_layout: wgpu::BindGroupLayout,
     blit_layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
@@ -45,7 +51,7 @@ pub struct SceneGpu {
 }
 
 /// What a picture that lies in a target was drawn with, beside its buffers.
-type Signature = (Uniforms, ColorMap, [u32; 2], [f64; 4]);
+type Signature = (Uniforms, ShadeUniforms, ColorMap, [u32; 2], [f64; 4]);
 
 /// One picture.
 struct SlotGpu {
@@ -64,6 +70,8 @@ struct MeshGpu {
     changing: wgpu::Buffer,
     indices: wgpu::Buffer,
     count: u32,
+    /// Of the edges, and how many ends they have.
+    edges: Option<(wgpu::Buffer, u32)>,
 }
 
 struct Targets {
@@ -71,7 +79,11 @@ struct Targets {
     color: wgpu::TextureView,
     depth: wgpu::TextureView,
     resolved: wgpu::TextureView,
-    bind: wgpu::BindGroup,
+    shade: ShadeTargets,
+    /// The picture as it was drawn, and as it is shaded.
+    binds: [wgpu::BindGroup; 2],
+    /// Whether it is the shaded one that is shown.
+    shaded: bool,
 }
 
 /// Makes the pipelines once, where the window's callbacks find them.
@@ -92,6 +104,7 @@ impl SceneGpu {
         });
         Self {
             pipelines: Pipelines::new(device, &scene_layout, &blit_layout, window),
+            shades: ShadePipelines::new(device),
             scene_layout,
             blit_layout,
             sampler,
@@ -110,12 +123,17 @@ impl SceneGpu {
         let slot = &mut self.slots[frame.slot as usize];
         let uploaded = slot.upload(device, queue, frame);
         tally::count(Done::Upload, usize::from(uploaded));
-        let signature = (frame.uniforms, frame.map, frame.size, frame.background);
-        if !uploaded && slot.drawn == Some(signature) {
+        let shading = &frame.shading;
+        let looks = (frame.uniforms, shading.uniforms);
+        let signature = (looks.0, looks.1, frame.map, frame.size, frame.background);
+        let fits = |t: &Targets| t.size == frame.size && t.shade.stands_on(&shading.floor);
+        let fits = slot.targets.as_ref().is_some_and(fits);
+        if !uploaded && fits && slot.drawn == Some(signature) {
             return;
         }
-        if slot.targets.as_ref().is_none_or(|t| t.size != frame.size) {
-            let targets = Targets::new(device, &self.blit_layout, frame.size);
+        if !fits {
+            let shades = (&self.shades, &shading.floor);
+            let targets = Targets::new((device, queue), &self.blit_layout, shades, frame.size);
             slot.targets = Some(targets);
         }
         if slot
@@ -136,6 +154,10 @@ impl SceneGpu {
         queue.write_buffer(&slot.uniforms, 0, bytemuck::bytes_of(&frame.uniforms));
         let through = frame.uniforms.look[0] < 1.0;
         slot.pass(encoder, &self.pipelines, frame.background, through);
+        if let Some(targets) = &mut slot.targets {
+            let shade = &targets.shade;
+            targets.shaded = shade.shade(queue, encoder, &self.shades, &shading.uniforms);
+        }
         slot.drawn = Some(signature);
         tally::count(Done::Redraw, 1);
     }
@@ -243,7 +265,7 @@ impl SlotGpu {
                 view: &targets.depth,
                 depth_ops: Some(wgpu::Operations {
                     load: wgpu::LoadOp::Clear(1.0),
-                    store: wgpu::StoreOp::Discard,
+                    store: wgpu::StoreOp::Store,
                 }),
                 stencil_ops: None,
             }),
@@ -263,6 +285,11 @@ impl SlotGpu {
         for pipeline in layers {
             pass.set_pipeline(pipeline);
             pass.draw_indexed(0..mesh.count, 0, 0..1);
+        }
+        if let Some((edges, count)) = &mesh.edges {
+            pass.set_index_buffer(edges.slice(..), wgpu::IndexFormat::Uint32);
+            pass.set_pipeline(&pipelines.edges);
+            pass.draw_indexed(0..*count, 0, 0..1);
         }
     }
 }
@@ -294,6 +321,11 @@ impl MeshGpu {
                 wgpu::BufferUsages::INDEX,
             ),
             count: 3 * solid.triangles.len() as u32,
+            edges: (!solid.edges.is_empty()).then(|| {
+                let ends = bytemuck::cast_slice(&solid.edges);
+                let buffer = buffer("limb edges", ends, wgpu::BufferUsages::INDEX);
+                (buffer, 2 * solid.edges.len() as u32)
+            }),
             solid: Arc::clone(solid),
             shown: Arc::clone(&frame.shown),
         }
@@ -301,7 +333,12 @@ impl MeshGpu {
 }
 
 impl Targets {
-    fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, size: [u32; 2]) -> Self {
+    fn new(
+        (device, queue): (&wgpu::Device, &wgpu::Queue),
+        layout: &wgpu::BindGroupLayout,
+        (shades, floor): (&ShadePipelines, &Arc<FloorShadow>),
+        size: [u32; 2],
+    ) -> Self {
         let view = |format, sample_count, usage| {
             device
                 .create_texture(&wgpu::TextureDescriptor {
@@ -321,21 +358,30 @@ impl Targets {
                 .create_view(&wgpu::TextureViewDescriptor::default())
         };
         let none = wgpu::TextureUsages::empty();
-        let resolved = view(COLOR, 1, wgpu::TextureUsages::TEXTURE_BINDING);
-        let bind = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("limb picture"),
-            layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(&resolved),
-            }],
+        let bound = wgpu::TextureUsages::TEXTURE_BINDING;
+        let resolved = view(COLOR, 1, bound);
+        let depth = view(DEPTH, SAMPLES, bound);
+        let [left, finished] = ShadeTargets::FORMATS.map(|format| view(format, 1, bound));
+        let drawn = (&depth, &resolved);
+        let shade = ShadeTargets::new((device, queue), shades, drawn, (left, finished), floor);
+        let binds = [&resolved, shade.finished()].map(|picture| {
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("limb picture"),
+                layout,
+                entries: &[wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(picture),
+                }],
+            })
         });
         Self {
             size,
             color: view(COLOR, SAMPLES, none),
-            depth: view(DEPTH, SAMPLES, none),
+            depth,
             resolved,
-            bind,
+            shade,
+            binds,
+            shaded: false,
         }
     }
 }
@@ -366,7 +412,7 @@ impl CallbackTrait for Frame3d {
         };
         if let Some(targets) = &scene.slots[self.slot as usize].targets {
             pass.set_pipeline(&scene.pipelines.blit);
-            pass.set_bind_group(0, &targets.bind, &[]);
+            pass.set_bind_group(0, &targets.binds[usize::from(targets.shaded)], &[]);
             pass.draw(0..3, 0..1);
         }
     }

@@ -2,7 +2,7 @@
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-use super::view::{ScreenWay, Stage, Tool, ViewState};
+use super::view::{Floor, ScreenWay, Stage, Tool, ViewState};
 use crate::document::Layer;
 use crate::io::examples::Example;
 use crate::render::camera::Preset;
@@ -58,6 +58,7 @@ pub enum UiCommand {
     Section,
     Unrolled,
     Jig,
+    Floor,
     DarkLight,
     LargerText,
     SmallerText,
@@ -119,6 +120,7 @@ impl UiCommand {
             Self::Frame => "Frame the limb",
             Self::FramePicked => "Frame picked gauges",
             Self::SeeThrough => "See-through",
+            Self::Floor => "Shadow on the floor",
             Self::Section => "Section",
             Self::Unrolled => "Unrolled view",
             Self::Jig => "Jig",
@@ -237,6 +239,7 @@ impl UiCommand {
             Self::Frame => "Show the whole limb",
             Self::FramePicked => "Come near to the picked gauges",
             Self::SeeThrough => "See the inside through the walls in front",
+            Self::Floor => "Show where the limb would stand, by its shadow; or nothing below it",
             Self::Section => "Cut a part of the limb away",
             Self::Unrolled => "Show the limb laid flat beside it",
             Self::Jig => "Show what presses the gauges to the wall while they are glued",
@@ -330,6 +333,7 @@ impl UiCommand {
             | Self::PausePresses
             | Self::StopPresses
             | Self::SkipPress
+            | Self::Floor
             | Self::DarkLight
             | Self::Paint(_)
             | Self::Stage(_) => None,
@@ -385,6 +389,7 @@ impl UiCommand {
             Self::Section,
             Self::Unrolled,
             Self::Jig,
+            Self::Floor,
             Self::DarkLight,
             Self::LargerText,
             Self::SmallerText,
@@ -457,6 +462,7 @@ pub fn is_on(session: &Session, view: &ViewState, command: UiCommand) -> bool {
     match command {
         UiCommand::Follow => session.desk.follow,
         UiCommand::SeeThrough => view.see_through,
+        UiCommand::Floor => view.floor == Floor::Shadow,
         UiCommand::Section => view.section.is_some(),
         UiCommand::Unrolled => view.unrolled_shown,
         UiCommand::Jig => view.jig_shown,

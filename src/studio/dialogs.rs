@@ -8,7 +8,7 @@ use egui::Context;
 use super::action::{Action, FileAction, WindowAction};
 use super::ask::Ask;
 use super::commands::UiCommand;
-use super::view::Picture;
+use super::view::{Backdrop, Picture};
 use crate::document::Document;
 use crate::io::examples::Example;
 use crate::io::mesh_file::{ENDINGS, may_say_unit, needs_unit};
@@ -30,9 +30,9 @@ pub struct Dialog {
     unit: Unit,
     /// The file says its unit, where it may.
     own_unit: bool,
-    /// Of a picture: width and height in pixels, and whether what is behind the limb is left out.
+    /// Of a picture: width and height in pixels, and what is behind the limb.
     size: [u32; 2],
-    transparent: bool,
+    backdrop: Backdrop,
     /// The desktop's own dialog, while it is open.
     browsing: Option<Receiver<Option<PathBuf>>>,
     focused: bool,
@@ -46,7 +46,7 @@ impl Dialog {
             unit: Unit::Millimetre,
             own_unit: true,
             size: [1920, 1080],
-            transparent: false,
+            backdrop: Backdrop::default(),
             browsing: None,
             focused: false,
         }
@@ -349,7 +349,13 @@ impl Dialog {
                 ui.add(egui::DragValue::new(side).range(16..=16384).suffix(" px"))
                     .accessible_name(name);
             }
-            ui.checkbox(&mut self.transparent, "Transparent background");
+            egui::ComboBox::new("Backdrop", "Backdrop")
+                .selected_text(self.backdrop.name())
+                .show_ui(ui, |ui| {
+                    for backdrop in Backdrop::ALL {
+                        ui.selectable_value(&mut self.backdrop, backdrop, backdrop.name());
+                    }
+                });
         });
     }
 
@@ -381,7 +387,7 @@ impl Dialog {
         Picture {
             size: self.size,
             view: None,
-            transparent: self.transparent,
+            backdrop: self.backdrop,
         }
     }
 }

@@ -96,6 +96,7 @@ fn look_at(command: UiCommand, ask: &mut Ask<'_>, scene: &PartScene) {
             scene.frame_points(view, &picked, &session.document);
         }
         UiCommand::SeeThrough => view.see_through = !view.see_through,
+        UiCommand::Floor => view.floor = view.floor.toggled(),
         UiCommand::Section => scene.toggle_section(view),
         UiCommand::Unrolled => {
             view.unrolled_shown = !view.unrolled_shown;

@@ -11,7 +11,7 @@ use super::palette::{self, Palette};
 use super::recovery::Recovery;
 use super::study::StudyView;
 use super::trade::Dial;
-use super::view::{Pane, Stage, Tab};
+use super::view::{Backdrop, Pane, Stage, Tab};
 use super::{
     confusions, inspector, jig, jobs, kept, legend, live, measure, overlay, results, study, trade,
 };
@@ -84,7 +84,7 @@ impl Panels {
 pub fn draw(look: LimbLook<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
     for &(pane, rect) in panes {
         match pane {
-            Pane::Limb => overlay::paint_limb(look, ui, rect, false),
+            Pane::Limb => overlay::paint_limb(look, ui, rect, Backdrop::Window),
             Pane::Unrolled => overlay::paint_unrolled(look, ui, rect),
         }
         draw_over(look, ui, pane, rect);
@@ -117,8 +117,8 @@ fn draw_over(look: LimbLook<'_>, ui: &Ui, pane: Pane, rect: Rect) {
 }
 
 /// The limb with all that belongs to it, for a picture.
-pub fn picture(look: LimbLook<'_>, ui: &Ui, rect: Rect, transparent: bool) {
-    overlay::paint_limb(look, ui, rect, transparent);
+pub fn picture(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
+    overlay::paint_limb(look, ui, rect, backdrop);
     let painter = &ui.painter_at(rect);
     jig::paint_jig(look, painter, Pane::Limb);
     bench::paint_bench(look, painter, Pane::Limb);

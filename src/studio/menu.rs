@@ -108,6 +108,7 @@ fn view_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
         UiCommand::Section,
         UiCommand::Unrolled,
         UiCommand::Jig,
+        UiCommand::Floor,
     ] {
         ask.button(ui, command);
     }

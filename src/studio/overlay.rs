@@ -6,21 +6,23 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, vec2};
 use glam::{DVec3, Mat4};
 
 use super::paint::{LimbLook, label};
-use super::view::{Field, Gesture, Pane, Tool};
+use super::view::{Backdrop, Field, Floor, Gesture, Pane, Tool};
 use super::{labels, theme};
 use crate::colormap::ColorMap;
 use crate::mesh::stretch::KEPT;
 use crate::project::ChosenSite;
-use crate::render::gpu::{Frame3d, PictureSlot, Uniforms};
+use crate::render::gpu::{Frame3d, PictureSlot, ShadeUniforms, Shading, Uniforms};
 use eframe::egui_wgpu;
 
 /// How much a wall covers what is behind it when it can be seen through.
 const GHOST: f32 = 0.22;
+/// How much an edge of the part covers.
+const EDGES: f32 = 0.6;
 /// Of a gauge's number (points).
 const MARK: f32 = 9.0;
 
 /// The limb itself, as the adapter draws it.
-pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, transparent: bool) {
+pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
     let Some(built) = &look.scene.built else {
         return;
     };
@@ -41,22 +43,61 @@ pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, transparent: bool) {
         look: cover(look, if look.view.see_through { GHOST } else { 1.0 }),
         up: camera.stance.up().as_vec3().extend(0.0).to_array(),
     };
-    let back = if transparent {
-        Color32::TRANSPARENT
-    } else {
-        theme::backdrop(ui.ctx().theme())
-    };
+    let back = theme::backdrop(backdrop, ui.ctx().theme());
     let frame = Frame3d {
         slot: PictureSlot::Limb,
         solid: Arc::clone(&look.scene.solid),
         shown: Arc::clone(&built.shown),
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
         uniforms,
+        shading: shading(look, pixels(ui, rect), back),
         background: back.to_array().map(|c| f64::from(c) / 255.0),
         size: pixels(ui, rect),
     };
     ui.painter()
         .add(egui_wgpu::Callback::new_paint_callback(rect, frame));
+}
+
+/// How light falls: less of it into corners, and a shadow on the floor.
+fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shading {
+    /// How far off walls take light, over the part's size.
+    const REACH: f64 = 0.07;
+    let (camera, floor) = (&look.view.camera, &look.scene.floor);
+    let aspect = width as f32 / height as f32;
+    let relative = |v: DVec3| (v / camera.distance).as_vec3();
+    let (lower, upper) = look.session.document.part.bounds();
+    let reach = REACH * (upper - lower).length() / camera.distance;
+    // Where walls can be seen through, corners are of those behind.
+    let ambient = f32::from(u8::from(!look.view.see_through));
+    let dark = f32::from(u8::from(look.view.floor == Floor::Shadow));
+    let along = |axis: DVec3| axis.as_vec3() * (camera.distance / floor.half) as f32;
+    Shading {
+        uniforms: ShadeUniforms {
+            inverse: camera.matrix(aspect).inverse().to_cols_array_2d(),
+            eye: camera
+                .toward_eye()
+                .as_vec3()
+                .extend(camera.scale(height))
+                .to_array(),
+            ambient: [reach as f32, ambient, 0.0, 0.0],
+            background: back.to_array().map(|c| f32::from(c) / 255.0),
+            floor_middle: relative(floor.middle - camera.target)
+                .extend(dark)
+                .to_array(),
+            floor_right: along(floor.stance.right()).extend(0.0).to_array(),
+            floor_front: along(floor.stance.front()).extend(0.0).to_array(),
+            up: floor.stance.up().as_vec3().extend(0.0).to_array(),
+        },
+        floor: Arc::clone(floor),
+    }
+}
+
+/// A flat picture has neither corners nor a floor.
+fn unshaded(look: LimbLook<'_>) -> Shading {
+    Shading {
+        uniforms: bytemuck::Zeroable::zeroed(),
+        floor: Arc::clone(&look.scene.floor),
+    }
 }
 
 /// Exaggeration, and whether a field or the regions colour the limb.
@@ -74,7 +115,7 @@ fn deform_flags(look: LimbLook<'_>, exaggeration: f32) -> [f32; 4] {
 /// How much walls cover what is behind them, and whether blind places are marked.
 fn cover(look: LimbLook<'_>, share: f32) -> [f32; 4] {
     let marked = look.view.field == Field::Expected && look.scene.shows_field();
-    [share, f32::from(u8::from(marked)), 0.0, 0.0]
+    [share, f32::from(u8::from(marked)), EDGES, 0.0]
 }
 
 /// The same laid flat.
@@ -105,13 +146,14 @@ pub fn paint_unrolled(look: LimbLook<'_>, ui: &Ui, rect: Rect) {
         look: cover(look, 1.0),
         up: [0.0, 0.0, 1.0, KEPT as f32],
     };
-    let back = theme::backdrop(ui.ctx().theme());
+    let back = theme::backdrop(Backdrop::Window, ui.ctx().theme());
     let frame = Frame3d {
         slot: PictureSlot::Unrolled,
         solid: Arc::clone(&look.scene.unrolled.solid),
         shown: Arc::clone(&flat.shown),
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
         uniforms,
+        shading: unshaded(look),
         background: back.to_array().map(|c| f64::from(c) / 255.0),
         size: pixels(ui, rect),
     };

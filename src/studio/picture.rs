@@ -18,7 +18,7 @@ use crate::render::camera::Camera;
 use crate::render::{gpu, offscreen};
 use crate::session::{Session, Task, Wake};
 
-pub use super::view::Picture;
+pub use super::view::{Backdrop, Picture};
 
 /// Height of the window, in points, that a picture is drawn like: gauges and letters grow with the pixels.
 const POINTS: f32 = 720.0;
@@ -155,7 +155,7 @@ fn drawn(
             view: &view,
             scene,
         };
-        layout::picture(look, ui, rect, picture.transparent);
+        layout::picture(look, ui, rect, picture.backdrop);
     })
 }
 

@@ -15,6 +15,7 @@ use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::stance::{Direction, Stance};
 use crate::project::PartAxis;
 use crate::render::camera::Camera;
+use crate::render::floor::FloorShadow;
 use crate::render::gpu::{GpuVertex, Solid};
 use crate::session::{PartShape, Session};
 
@@ -41,6 +42,7 @@ impl Unrolled {
         let solid = Solid {
             vertices: vertices.collect(),
             triangles: flat.triangles.clone(),
+            edges: Vec::new(),
         };
         Self {
             solid: Arc::new(solid),
@@ -61,6 +63,7 @@ pub struct PartScene {
     pub around: OrientedBox,
     pub index: Arc<SurfaceIndex>,
     pub solid: Arc<Solid>,
+    pub floor: Arc<FloorShadow>,
     pub unrolled: Unrolled,
     pub built: Option<BuiltField>,
 }
@@ -75,6 +78,7 @@ impl PartScene {
             around: OrientedBox::around(&document.part, stance),
             index: Arc::clone(&shape.index),
             solid: Arc::new(Solid::of(&document.part)),
+            floor: Arc::new(FloorShadow::of(&document.part, stance)),
             unrolled: Unrolled::of(Arc::clone(&shape.flat), stance),
             built: None,
         }
@@ -88,6 +92,7 @@ impl PartScene {
             let stance = axis.stance(&document.part);
             self.axis = axis;
             self.around = OrientedBox::around(&document.part, stance);
+            self.floor = Arc::new(FloorShadow::of(&document.part, stance));
             view.camera.stance = stance;
             let around = &self.around;
             view.section =

@@ -2,6 +2,8 @@
 
 use egui::{Color32, Context, Theme, ThemePreference, Visuals};
 
+use super::view::Backdrop;
+
 /// Chosen gauges.
 pub const CHOSEN: Color32 = Color32::from_rgb(230, 110, 30);
 /// The applied touch.
@@ -11,12 +13,14 @@ pub const STALE: Color32 = Color32::from_rgb(225, 180, 80);
 /// What went wrong, or is not to be trusted.
 pub const ERROR: Color32 = Color32::from_rgb(235, 110, 95);
 
-/// Behind the limb, by theme.
+/// Behind the limb.
 #[must_use]
-pub fn backdrop(theme: Theme) -> Color32 {
-    match theme {
-        Theme::Dark => Color32::from_rgb(24, 27, 32),
-        Theme::Light => Color32::from_rgb(226, 230, 235),
+pub fn backdrop(backdrop: Backdrop, theme: Theme) -> Color32 {
+    match (backdrop, theme) {
+        (Backdrop::Transparent, _) => Color32::TRANSPARENT,
+        (Backdrop::Neutral, _) => Color32::from_rgb(206, 211, 217),
+        (Backdrop::Dark, _) | (_, Theme::Dark) => Color32::from_rgb(24, 27, 32),
+        (_, Theme::Light) => Color32::from_rgb(226, 230, 235),
     }
 }
 

@@ -16,7 +16,8 @@ use crate::session::{ExpectedOf, Session};
 
 pub use crate::session::Stage;
 pub use choices::{
-    Field, Gesture, Measure, Pane, Picture, Ranges, ScreenWay, SectionPlane, Tab, Tool,
+    Backdrop, Field, Floor, Gesture, Measure, Pane, Picture, Ranges, ScreenWay, SectionPlane, Tab,
+    Tool,
 };
 
 /// What is shown, picked and chosen.
@@ -45,6 +46,7 @@ pub struct ViewState {
     pub mirror: Option<Direction>,
     pub section: Option<SectionPlane>,
     pub see_through: bool,
+    pub floor: Floor,
     pub unrolled_shown: bool,
     /// Whether the jig is drawn.
     pub jig_shown: bool,
@@ -84,6 +86,7 @@ impl ViewState {
             mirror: None,
             section: None,
             see_through: false,
+            floor: Floor::default(),
             unrolled_shown: false,
             jig_shown: false,
             flat: (DVec2::ZERO, 0.0),

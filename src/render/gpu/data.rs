@@ -17,6 +17,8 @@ pub struct GpuVertex {
 pub struct Solid {
     pub vertices: Vec<GpuVertex>,
     pub triangles: Vec<[u32; 3]>,
+    /// Pairs of vertices between which a line is drawn: rims and sharp edges.
+    pub edges: Vec<[u32; 2]>,
 }
 
 impl Solid {
@@ -32,8 +34,20 @@ impl Solid {
                 })
                 .collect(),
             triangles: mesh.triangles().to_vec(),
+            edges: edges(mesh),
         }
     }
+}
+
+/// Where the surface ends, branches, or turns by so much that nobody takes it for round.
+fn edges(mesh: &TriMesh) -> Vec<[u32; 2]> {
+    /// 40°: a circle of ten sides is round.
+    const SHARP: f64 = 0.766;
+    let drawn = mesh.edges().iter().filter(|edge| match edge.triangles[..] {
+        [a, b] => mesh.facet_normal(a).dot(mesh.facet_normal(b)) < SHARP,
+        _ => true,
+    });
+    drawn.map(|edge| [edge.a, edge.b]).collect()
 }
 
 /// What changes with field and region, a vertex.
@@ -60,7 +74,7 @@ pub struct Uniforms {
     /// A plane: what lies on its positive side is cut away.
     pub section: [f32; 4],
     /// x: how much of the wall that faces the eye covers what is behind it, 1 for all; y: 1 where the first layer
-    /// marks what is blind.
+    /// marks what is blind; z: how much an edge covers.
     pub look: [f32; 4],
     /// xyz: the direction up; w: the stretch above which lengths are marked as off, 0 for none.
     pub up: [f32; 4],

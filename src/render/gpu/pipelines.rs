@@ -13,6 +13,8 @@ pub(super) struct Pipelines {
     /// The walls that face away, and those that face the eye drawn over them.
     pub(super) away: wgpu::RenderPipeline,
     pub(super) ghost: wgpu::RenderPipeline,
+    /// Rims and sharp edges, over the walls.
+    pub(super) edges: wgpu::RenderPipeline,
     pub(super) blit: wgpu::RenderPipeline,
 }
 
@@ -57,6 +59,8 @@ enum WallPass {
     FacingAway,
     /// Those that face the eye, over what is behind them.
     Ghost,
+    /// No walls: the lines where they end or turn.
+    Edges,
 }
 
 impl Pipelines {
@@ -75,6 +79,7 @@ impl Pipelines {
             whole: of(WallPass::All),
             away: of(WallPass::FacingAway),
             ghost: of(WallPass::Ghost),
+            edges: of(WallPass::Edges),
             blit: blit_pipeline(device, blit, window),
         }
     }
@@ -86,7 +91,8 @@ fn scene_pipeline(
     shader: &wgpu::ShaderModule,
     walls: WallPass,
 ) -> wgpu::RenderPipeline {
-    let ghost = walls == WallPass::Ghost;
+    let edges = walls == WallPass::Edges;
+    let blends = edges || walls == WallPass::Ghost;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("limb"),
         bind_group_layouts: &[Some(layout)],
@@ -106,7 +112,7 @@ fn scene_pipeline(
         layout: Some(&pipeline_layout),
         vertex: wgpu::VertexState {
             module: shader,
-            entry_point: Some("vs"),
+            entry_point: Some(if edges { "vs_edge" } else { "vs" }),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             buffers: &[
                 buffer(size_of::<GpuVertex>() as u64, &fixed),
@@ -114,8 +120,13 @@ fn scene_pipeline(
             ],
         },
         primitive: wgpu::PrimitiveState {
+            topology: if edges {
+                wgpu::PrimitiveTopology::LineList
+            } else {
+                wgpu::PrimitiveTopology::TriangleList
+            },
             cull_mode: match walls {
-                WallPass::All => None,
+                WallPass::All | WallPass::Edges => None,
                 WallPass::FacingAway => Some(wgpu::Face::Front),
                 WallPass::Ghost => Some(wgpu::Face::Back),
             },
@@ -123,7 +134,7 @@ fn scene_pipeline(
         },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
-            depth_write_enabled: Some(!ghost),
+            depth_write_enabled: Some(!blends),
             depth_compare: Some(wgpu::CompareFunction::Less),
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
@@ -134,11 +145,15 @@ fn scene_pipeline(
         },
         fragment: Some(wgpu::FragmentState {
             module: shader,
-            entry_point: Some(if ghost { "fs_ghost" } else { "fs" }),
+            entry_point: Some(match walls {
+                WallPass::All | WallPass::FacingAway => "fs",
+                WallPass::Ghost => "fs_ghost",
+                WallPass::Edges => "fs_edge",
+            }),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             targets: &[Some(wgpu::ColorTargetState {
                 format: COLOR,
-                blend: ghost.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                blend: blends.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
                 write_mask: wgpu::ColorWrites::ALL,
             })],
         }),

@@ -303,8 +303,53 @@ pub struct Picture {
     pub size: [u32; 2],
     /// The side to look from; three-quarters from above where there is none.
     pub view: Option<Preset>,
-    /// Leave out what is behind the limb.
-    pub transparent: bool,
+    pub backdrop: Backdrop,
+}
+
+/// What is below the limb.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Floor {
+    /// Its shadow, as if it stood there.
+    #[default]
+    Shadow,
+    Nothing,
+}
+
+impl Floor {
+    #[must_use]
+    pub fn toggled(self) -> Self {
+        match self {
+            Self::Shadow => Self::Nothing,
+            Self::Nothing => Self::Shadow,
+        }
+    }
+}
+
+/// What is behind the limb.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backdrop {
+    /// As in the window.
+    #[default]
+    Window,
+    Dark,
+    /// A light grey that prints well.
+    Neutral,
+    /// Nothing.
+    Transparent,
+}
+
+impl Backdrop {
+    pub const ALL: [Self; 4] = [Self::Window, Self::Dark, Self::Neutral, Self::Transparent];
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Window => "As in the window",
+            Self::Dark => "Dark",
+            Self::Neutral => "Neutral",
+            Self::Transparent => "Transparent",
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,136 @@
+// What light does around the limb once it is drawn: less of it in corners, and a soft shadow on the floor below.
+//
+// The corners go by what is near in the picture itself (M. McGuire, M. Mara, D. Luebke, Scalable ambient obscurance,
+// High-Performance Graphics 2012), so that any mesh does, moved or cut.
+
+struct Shade {
+    inverse: mat4x4f,   // from clip space to relative units
+    eye: vec4f,         // xyz: the eye (relative units), w: pixels of one unit at the distance one
+    ambient: vec4f,     // x: how far off walls take light (relative units), y: how much of it
+    background: vec4f,  // premultiplied with alpha
+    floor_middle: vec4f, // xyz: its middle (relative units), w: how dark its shadow is
+    floor_right: vec4f, // xyz: along its map, a unit over half of its side
+    floor_front: vec4f,
+    up: vec4f,
+};
+
+@group(0) @binding(0) var<uniform> shade: Shade;
+@group(0) @binding(1) var depth: texture_depth_multisampled_2d;
+@group(0) @binding(2) var lit: texture_2d<f32>;
+@group(0) @binding(3) var obscurance: texture_2d<f32>;
+@group(0) @binding(4) var floor_map: texture_2d<f32>;
+@group(0) @binding(5) var floor_sampler: sampler;
+
+const SAMPLES: u32 = 4u;
+const TAPS: i32 = 14;
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    let u = vec2f(f32((i << 1u) & 2u), f32(i & 2u));
+    return vec4f(u * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0), 0.0, 1.0);
+}
+
+fn clamped(pixel: vec2i) -> vec2i {
+    return clamp(pixel, vec2i(0), vec2i(textureDimensions(depth)) - 1);
+}
+
+// What is seen at a pixel that has a depth.
+fn seen(pixel: vec2i, at: f32) -> vec3f {
+    let size = vec2f(textureDimensions(depth));
+    let clip = vec2f(2.0, -2.0) * (vec2f(pixel) + 0.5) / size + vec2f(-1.0, 1.0);
+    let p = shade.inverse * vec4f(clip, at, 1.0);
+    return p.xyz / p.w;
+}
+
+fn seen_at(pixel: vec2i) -> vec3f {
+    let inside = clamped(pixel);
+    return seen(inside, textureLoad(depth, inside, 0));
+}
+
+// The shorter of the ways to both neighbours: the other one may lead over an edge.
+fn shorter(a: vec3f, b: vec3f) -> vec3f {
+    return select(b, a, dot(a, a) < dot(b, b));
+}
+
+@fragment
+fn fs_obscurance(@builtin(position) place: vec4f) -> @location(0) vec4f {
+    let pixel = vec2i(place.xy);
+    let own = textureLoad(depth, pixel, 0);
+    if (own >= 1.0) { return vec4f(1.0); }
+    let p = seen(pixel, own);
+    let across = shorter(p - seen_at(pixel - vec2i(1, 0)), seen_at(pixel + vec2i(1, 0)) - p);
+    let along = shorter(p - seen_at(pixel - vec2i(0, 1)), seen_at(pixel + vec2i(0, 1)) - p);
+    var n = normalize(cross(across, along));
+    let to_eye = shade.eye.xyz - p;
+    if (dot(n, to_eye) < 0.0) { n = -n; }
+
+    let radius = shade.ambient.x;
+    let reach = clamp(radius * shade.eye.w / length(to_eye), 4.0, 96.0);
+    let turn = 6.2831853 * fract(52.9829189 * fract(dot(place.xy, vec2f(0.06711056, 0.00583715))));
+    var sum = 0.0;
+    for (var k = 0; k < TAPS; k++) {
+        let share = (f32(k) + 0.5) / f32(TAPS);
+        let angle = 2.3999632 * f32(k) + turn;
+        let way = vec2i(round(reach * sqrt(share) * vec2f(cos(angle), sin(angle))));
+        let v = seen_at(pixel + way) - p;
+        let vv = dot(v, v) / (radius * radius);
+        // What lies in the wall's own plane, as coarse facets make it, takes nothing.
+        let vn = dot(v, n) / radius - 0.04;
+        let near = max(1.0 - vv, 0.0);
+        sum += near * near * near * max(vn / (0.02 + vv), 0.0);
+    }
+    let left = max(1.0 - shade.ambient.y * sum * 4.0 / f32(TAPS), 0.0);
+    return vec4f(left);
+}
+
+fn distance_of(at: f32) -> f32 {
+    // Of the camera's near and far planes, 0.02 and 20.
+    return 0.4 / (20.0 - 19.98 * at);
+}
+
+// The mean around a pixel over the pattern that neighbouring pixels are looked at in, not over edges.
+fn light_left(pixel: vec2i) -> f32 {
+    if (shade.ambient.y <= 0.0) { return 1.0; }
+    let own = distance_of(textureLoad(depth, pixel, 0));
+    var sum = vec2f(0.0);
+    for (var y = -2; y < 2; y++) {
+        for (var x = -2; x < 2; x++) {
+            let other = clamped(pixel + vec2i(x, y));
+            let away = abs(distance_of(textureLoad(depth, other, 0)) - own);
+            let weight = select(0.0, 1.0, away < 0.25 * shade.ambient.x);
+            sum += vec2f(textureLoad(obscurance, other, 0).x, 1.0) * weight;
+        }
+    }
+    return select(sum.x / sum.y, 1.0, sum.y < 0.5);
+}
+
+fn floor_shadow(pixel: vec2i) -> f32 {
+    if (shade.floor_middle.w <= 0.0) { return 0.0; }
+    let way = seen(pixel, 0.5) - shade.eye.xyz;
+    let above = dot(shade.eye.xyz - shade.floor_middle.xyz, shade.up.xyz);
+    let down = -dot(way, shade.up.xyz);
+    if (above <= 0.0 || down <= 0.0) { return 0.0; }
+    let off = shade.eye.xyz + way * (above / down) - shade.floor_middle.xyz;
+    let at = vec2f(dot(off, shade.floor_right.xyz), dot(off, shade.floor_front.xyz));
+    if (max(abs(at.x), abs(at.y)) >= 1.0) { return 0.0; }
+    let dark = textureSampleLevel(floor_map, floor_sampler, 0.5 + 0.5 * at, 0.0).x;
+    return dark * shade.floor_middle.w;
+}
+
+@fragment
+fn fs_finish(@builtin(position) place: vec4f) -> @location(0) vec4f {
+    let pixel = vec2i(place.xy);
+    var covered = 0.0;
+    for (var k = 0u; k < SAMPLES; k++) {
+        covered += select(0.0, 1.0 / f32(SAMPLES), textureLoad(depth, pixel, i32(k)) < 1.0);
+    }
+    let behind = (1.0 - covered) * shade.background;
+    let limb = textureLoad(lit, pixel, 0) - behind;
+    var left = 1.0;
+    if (covered > 0.0) { left = light_left(pixel); }
+    var dark = 0.0;
+    if (covered < 1.0) { dark = floor_shadow(pixel); }
+    let colour = limb.rgb * left + behind.rgb * (1.0 - dark);
+    // Over nothing the shadow is a layer of its own.
+    return vec4f(colour, limb.a + behind.a + (1.0 - covered) * (1.0 - shade.background.a) * dark);
+}

@@ -1,0 +1,158 @@
+//! The soft shadow of a part on the floor below it.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::mesh::TriMesh;
+use crate::mesh::stance::Stance;
+
+/// Cells of the map along each side: the shadow is soft everywhere.
+pub const CELLS: usize = 48;
+/// Pieces of the surface that it is summed over, at most.
+const PIECES: usize = 2400;
+
+/// How much of the sky the part takes from the floor it stands on, as a square map.
+pub struct FloorShadow {
+    /// Of the map, on the floor (m).
+    pub middle: DVec3,
+    /// Half of a side of the map (m).
+    pub half: f64,
+    /// The map's columns go to the right, its rows to the front.
+    pub stance: Stance,
+    /// Of each cell, row by row, 0 for none to 255 for all.
+    pub dark: Vec<u8>,
+}
+
+/// A piece of the surface.
+struct Piece {
+    at: DVec3,
+    /// Its normal times its area (m²).
+    facing: DVec3,
+}
+
+impl FloorShadow {
+    /// Of a part that stands on its lowest point.
+    #[must_use]
+    pub fn of(mesh: &TriMesh, stance: Stance) -> Self {
+        /// Of the map beyond the part, and of the gap below it, over the part's width.
+        const BEYOND: f64 = 0.9;
+        const GAP: f64 = 0.015;
+        let axes = [stance.right(), stance.front(), stance.up()];
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in mesh.positions() {
+            for (k, axis) in axes.iter().enumerate() {
+                low[k] = low[k].min(p.dot(*axis));
+                high[k] = high[k].max(p.dot(*axis));
+            }
+        }
+        let wide = (high[0] - low[0]).max(high[1] - low[1]);
+        let size = wide.max(0.3 * (high[2] - low[2])).max(f64::MIN_POSITIVE);
+        let middle = axes[0] * f64::midpoint(low[0], high[0])
+            + axes[1] * f64::midpoint(low[1], high[1])
+            + axes[2] * (low[2] - GAP * size);
+        let half = (0.5 + BEYOND) * size;
+        let pieces = pieces(mesh);
+        let taken = |cell: usize| {
+            let way = |k: usize| (2.0 * (k as f64 + 0.5) / CELLS as f64 - 1.0) * half;
+            let (x, y) = (way(cell % CELLS), way(cell / CELLS));
+            let from = middle + axes[0] * x + axes[1] * y;
+            let sky: f64 = pieces.iter().map(|p| p.taken_from(from, axes[2])).sum();
+            // Walls count once in front and once behind; nothing is darker than dark.
+            let rim = (1.0 - (x.abs().max(y.abs()) / half).powi(4)).max(0.0);
+            ((1.0 - (-0.5 * sky).exp()) * rim * 255.0).round() as u8
+        };
+        Self {
+            dark: (0..CELLS * CELLS).into_par_iter().map(taken).collect(),
+            middle,
+            half,
+            stance,
+        }
+    }
+}
+
+impl Piece {
+    /// The share of a floor's light that comes from the sky behind it (view factor from a point to a small piece).
+    fn taken_from(&self, from: DVec3, up: DVec3) -> f64 {
+        let way = self.at - from;
+        let squared = way.length_squared();
+        let above = way.dot(up).max(0.0);
+        self.facing.dot(way).abs() * above / (std::f64::consts::PI * squared * squared)
+    }
+}
+
+/// Pieces of about the same area, in the order of the triangles.
+fn pieces(mesh: &TriMesh) -> Vec<Piece> {
+    let count = mesh.triangles().len() as u32;
+    let share = mesh.area() / PIECES as f64;
+    let mut pieces = Vec::with_capacity(PIECES);
+    let mut waiting = 0.0;
+    for triangle in 0..count {
+        let area = mesh.facet_area(triangle);
+        waiting += area;
+        if waiting < share {
+            continue;
+        }
+        let corners = mesh.corners(triangle);
+        let parts = ((waiting / share) as usize).min(64);
+        for k in 0..parts {
+            // Evenly over the triangle (M. Roberts' sequence, folded over the diagonal).
+            let [mut u, mut v] =
+                [0.754_877_666, 0.569_840_296].map(|g| (0.5 + g * k as f64).fract());
+            if u + v > 1.0 {
+                (u, v) = (1.0 - u, 1.0 - v);
+            }
+            let [a, b, c] = corners;
+            pieces.push(Piece {
+                at: a + (b - a) * u + (c - a) * v,
+                facing: mesh.facet_normal(triangle) * (waiting / parts as f64),
+            });
+        }
+        waiting = 0.0;
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::stance::Stance;
+
+    /// A level square of a side of 20 mm, at some height (m) above a point of the floor.
+    fn plate(height: f64) -> TriMesh {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 0.01;
+        let mut positions = vec![
+            at(-1.0, -1.0, 0.0),
+            at(1.0, -1.0, 0.0),
+            at(1.0, 1.0, 0.0),
+            at(-1.0, 1.0, 0.0),
+        ];
+        for p in &mut positions {
+            p.z += height;
+        }
+        // So small that it takes nothing, it holds the floor down.
+        positions
+            .extend([[0.0, 0.0], [1e-7, 0.0], [0.0, 1e-7]].map(|[x, y]| DVec3::new(x, y, 0.0)));
+        let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6]];
+        TriMesh::new(&positions, &triangles, 0).unwrap().0
+    }
+
+    fn at_the_middle(shadow: &FloorShadow) -> u8 {
+        shadow.dark[CELLS / 2 * CELLS + CELLS / 2]
+    }
+
+    #[test]
+    fn a_plate_darkens_what_is_below_it_and_less_the_higher_it_is() {
+        let stance = Stance::about(DVec3::Z);
+        let [low, high] = [0.004, 0.02].map(|height| FloorShadow::of(&plate(height), stance));
+        let corner = low.dark[0];
+        assert!(corner < 8, "{corner}");
+        let (near, far) = (at_the_middle(&low), at_the_middle(&high));
+        assert!(near > far && far > 20, "{near} {far}");
+        // As a view factor says it: a square of half a side a, at a height h, over its middle.
+        let ratio: f64 = 0.01 / (0.02 + 0.015 * 0.02);
+        let slant = ratio / (1.0 + ratio * ratio).sqrt();
+        let factor = 4.0 / std::f64::consts::PI * slant * slant.atan();
+        let expected = (1.0 - (-0.5 * factor).exp()) * 255.0;
+        assert!((f64::from(far) - expected).abs() < 4.0, "{far} {expected}");
+    }
+}
