@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, vec2};
+use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, vec2};
 use glam::{DVec3, Mat4};
 
 use super::paint::{LimbLook, label};
@@ -222,13 +222,15 @@ fn mark(look: LimbLook<'_>, pane: Pane, number: usize, site: &ChosenSite) -> Opt
     let position = DVec3::from_array(site.position_mm) / 1000.0;
     let direction = DVec3::from_array(site.direction);
     let half = look.project().gauge.grid_length_mm * 0.5e-3;
-    let (ends, at, near) = match pane {
+    let side = look.project().gauge.grid_width_mm * 0.5e-3;
+    let (ends, across, at, near) = match pane {
         Pane::Unrolled => {
             let at = look.scene.flat_place(look.view, position)?;
             let turned = look.scene.unrolled.flat.turn(position, direction);
             let along = (turned * half / look.view.flat.1).as_vec2();
             let along = vec2(along.x, -along.y);
-            ([at - along, at + along], at, true)
+            let across = along.rot90() * (side / half) as f32;
+            ([at - along, at + along], across, at, true)
         }
         Pane::Limb => {
             if look.view.is_cut(position) {
@@ -242,12 +244,15 @@ fn mark(look: LimbLook<'_>, pane: Pane, number: usize, site: &ChosenSite) -> Opt
                 return None;
             };
             let near = normal.dot(look.view.camera.toward_eye()) > 0.0;
-            ([a, b], look.view.place(centre)?, near)
+            let at = look.view.place(centre)?;
+            let beside = look.view.place(centre + normal.cross(direction) * side)?;
+            ([a, b], beside - at, at, near)
         }
     };
     Some(Mark {
         number: number + 1,
         ends,
+        across,
         at,
         near,
         picked: look.view.picked.contains(&number),
@@ -341,10 +346,12 @@ fn pixels(ui: &Ui, rect: Rect) -> [u32; 2] {
     [size.x, size.y].map(|s| s.round().max(1.0) as u32)
 }
 
-/// A gauge as it is drawn: a bar along its direction with its number; hollow on the far wall.
+/// A gauge as it is drawn: its grid's outline and a bar along its direction, with its number; hollow on the far wall.
 struct Mark {
     number: usize,
     ends: [Pos2; 2],
+    /// To a side of the grid.
+    across: Vec2,
     at: Pos2,
     near: bool,
     picked: bool,
@@ -352,6 +359,20 @@ struct Mark {
 }
 
 impl Mark {
+    /// The grid as large as it is, where that is more than the bar.
+    fn paint_grid(&self, painter: &Painter, colour: Color32) {
+        /// Half of its width (points).
+        const WIDER: f32 = 4.0;
+        let ([a, b], across) = (self.ends, self.across);
+        if across.length() < WIDER {
+            return;
+        }
+        let corners = vec![a - across, b - across, b + across, a + across];
+        let fill = colour.gamma_multiply(0.35);
+        let edge = Stroke::new(1.5, colour);
+        painter.add(Shape::convex_polygon(corners, fill, edge));
+    }
+
     /// With its number at `place`, and a line to it where that is elsewhere.
     fn paint(&self, painter: &Painter, place: Pos2) {
         let [a, b] = self.ends;
@@ -359,6 +380,7 @@ impl Mark {
         let half = ((b - a).length() / 2.0).max(12.0);
         let alpha = if self.near { 1.0 } else { 0.55 };
         let colour = theme::CHOSEN.gamma_multiply(alpha);
+        self.paint_grid(painter, colour);
         painter.line_segment(
             [self.at - along * half, self.at + along * half],
             Stroke::new(4.0, colour),

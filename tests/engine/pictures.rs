@@ -55,6 +55,28 @@ fn a_picture_has_the_size_the_limb_and_its_gauges() {
 }
 
 #[test]
+fn a_limb_stands_on_a_floor_and_its_edges_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("limb.png");
+    let size = ["--size", "400x600", "--backdrop", "neutral", "--out"];
+    let drawn = render(&[&size[..], &[out.to_str().unwrap()]].concat());
+    assert!(drawn.status.success());
+    let picture = image::open(&out).unwrap().to_rgba8();
+    let count = |is: &dyn Fn([u8; 4]) -> bool| picture.pixels().filter(|p| is(p.0)).count();
+    let backdrop = picture.get_pixel(3, 3).0;
+    assert_eq!(backdrop, [206, 211, 217, 255]);
+    // In the shadow the backdrop keeps its hue: both differences shrink with its light.
+    let shadow = count(&|[r, g, b, _]| {
+        let share = f32::from(g) / 211.0;
+        let hue = |c: u8, of: f32| (f32::from(c) - of * share).abs() < 1.2;
+        (0.3..0.96).contains(&share) && hue(r, 206.0) && hue(b, 217.0)
+    });
+    assert!(shadow > 2000, "{shadow} pixels in the shadow");
+    let edges = count(&|[r, g, b, _]| r < 110 && g < 110 && b < 110);
+    assert!(edges > 400, "{edges} pixels of edges");
+}
+
+#[test]
 fn what_cannot_be_drawn_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("limb.png");
