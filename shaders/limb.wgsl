@@ -33,11 +33,15 @@ struct Fragment {
     @location(4) stretch: f32,
 };
 
-@vertex
-fn vs(v: Vertex) -> Fragment {
+fn placed(v: Vertex) -> Fragment {
     let p = v.position + v.displacement * scene.deform.x;
     let local = (p - scene.target_scale.xyz) * scene.target_scale.w;
     return Fragment(scene.matrix * vec4f(local, 1.0), local, v.normal, v.value, v.region, v.stretch);
+}
+
+@vertex
+fn vs(v: Vertex) -> Fragment {
+    return placed(v);
 }
 
 // Facets at a sharp edge are lit by themselves: the normals of their corners are the mean of both sides, and would round the
@@ -98,7 +102,7 @@ fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
 // Rims and sharp edges, a little nearer to the eye than the walls that they bound.
 @vertex
 fn vs_edge(v: Vertex) -> Fragment {
-    var f = vs(v);
+    var f = placed(v);
     f.clip.z -= 0.00006 * f.clip.w;
     return f;
 }
