@@ -6,7 +6,7 @@
 struct Shade {
     inverse: mat4x4f,   // from clip space to relative units
     eye: vec4f,         // xyz: the eye (relative units), w: pixels of one unit at the distance one
-    ambient: vec4f,     // x: how far off walls take light (relative units), y: how much of it
+    ambient: vec4f,     // x: how far off walls take light (relative units), y: how much of it, z: light on the floor
     background: vec4f,  // premultiplied with alpha
     floor_middle: vec4f, // xyz: its middle (relative units), w: how dark its shadow is
     floor_right: vec4f, // xyz: along its map, a unit over half of its side
@@ -104,17 +104,18 @@ fn light_left(pixel: vec2i) -> f32 {
     return select(sum.x / sum.y, 1.0, sum.y < 0.5);
 }
 
-fn floor_shadow(pixel: vec2i) -> f32 {
-    if (shade.floor_middle.w <= 0.0) { return 0.0; }
+// How much of the light the part takes from the floor, and how much falls there.
+fn floor_at(pixel: vec2i) -> vec2f {
+    if (shade.floor_middle.w <= 0.0) { return vec2f(0.0); }
     let way = seen(pixel, 0.5) - shade.eye.xyz;
     let above = dot(shade.eye.xyz - shade.floor_middle.xyz, shade.up.xyz);
     let down = -dot(way, shade.up.xyz);
-    if (above <= 0.0 || down <= 0.0) { return 0.0; }
+    if (above <= 0.0 || down <= 0.0) { return vec2f(0.0); }
     let off = shade.eye.xyz + way * (above / down) - shade.floor_middle.xyz;
     let at = vec2f(dot(off, shade.floor_right.xyz), dot(off, shade.floor_front.xyz));
-    if (max(abs(at.x), abs(at.y)) >= 1.0) { return 0.0; }
+    if (max(abs(at.x), abs(at.y)) >= 1.0) { return vec2f(0.0); }
     let dark = textureSampleLevel(floor_map, floor_sampler, 0.5 + 0.5 * at, 0.0).x;
-    return dark * shade.floor_middle.w;
+    return vec2f(dark * shade.floor_middle.w, shade.ambient.z * smoothstep(1.0, 0.0, length(at)));
 }
 
 @fragment
@@ -128,9 +129,10 @@ fn fs_finish(@builtin(position) place: vec4f) -> @location(0) vec4f {
     let limb = textureLoad(lit, pixel, 0) - behind;
     var left = 1.0;
     if (covered > 0.0) { left = light_left(pixel); }
-    var dark = 0.0;
-    if (covered < 1.0) { dark = floor_shadow(pixel); }
-    let colour = limb.rgb * left + behind.rgb * (1.0 - dark);
+    var ground = vec2f(0.0);
+    if (covered < 1.0) { ground = floor_at(pixel); }
+    let free = 1.0 - covered;
+    let colour = limb.rgb * left + (behind.rgb + free * ground.y) * (1.0 - ground.x);
     // Over nothing the shadow is a layer of its own.
-    return vec4f(colour, limb.a + behind.a + (1.0 - covered) * (1.0 - shade.background.a) * dark);
+    return vec4f(colour, limb.a + behind.a + free * (1.0 - shade.background.a) * ground.x);
 }

@@ -62,6 +62,8 @@ pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
 fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shading {
     /// How far off walls take light, over the part's size.
     const REACH: f64 = 0.07;
+    /// Of white.
+    const FLOOR_LIGHT: f32 = 0.1;
     let (camera, floor) = (&look.view.camera, &look.scene.floor);
     let aspect = width as f32 / height as f32;
     let relative = |v: DVec3| (v / camera.distance).as_vec3();
@@ -70,6 +72,9 @@ fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shad
     // Where walls can be seen through, corners are of those behind.
     let ambient = f32::from(u8::from(!look.view.see_through));
     let dark = f32::from(u8::from(look.view.floor == Floor::Shadow));
+    // On a dark floor no shadow is seen.
+    let is_dark = back.is_opaque() && back.intensity() < 0.3;
+    let light = if is_dark { FLOOR_LIGHT } else { 0.0 };
     let along = |axis: DVec3| axis.as_vec3() * (camera.distance / floor.half) as f32;
     Shading {
         uniforms: ShadeUniforms {
@@ -79,7 +84,7 @@ fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shad
                 .as_vec3()
                 .extend(camera.scale(height))
                 .to_array(),
-            ambient: [reach as f32, ambient, 0.0, 0.0],
+            ambient: [reach as f32, ambient, light, 0.0],
             background: back.to_array().map(|c| f32::from(c) / 255.0),
             floor_middle: relative(floor.middle - camera.target)
                 .extend(dark)
