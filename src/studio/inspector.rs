@@ -56,7 +56,7 @@ fn purpose(stage: Stage) -> &'static str {
         Stage::Evaluation => "How well touches that nobody trained on are found",
         Stage::Report => "What a workshop needs to build it",
         Stage::Bench => {
-            "A machine presses the limb at many places, and what the gauges read is written down"
+            "The limb is pressed at many places, and what the gauges read is written down"
         }
         Stage::Live => "Where and how hard the part is touched, now",
     }

@@ -3,7 +3,7 @@
 use egui::{Align2, Color32, FontId, Painter, Rect, pos2, vec2};
 
 use super::paint::{LimbLook, label, plate};
-use super::view::{Field, Tool};
+use super::view::{Field, Stage, Tool};
 use crate::colormap::ColorMap;
 use crate::document::Layer;
 
@@ -207,6 +207,9 @@ fn field_hint(look: LimbLook<'_>) -> &'static str {
             if look.scene.built.as_ref().is_none_or(|b| b.legend.is_none()) =>
         {
             "Computing the field …"
+        }
+        _ if look.view.stage == Stage::Bench && look.session.bench.step().is_some() => {
+            "Click: where it is pressed   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
         }
         _ => {
             "Click: press the limb   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
