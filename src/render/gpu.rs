@@ -153,7 +153,9 @@ impl SceneGpu {
         }
         queue.write_buffer(&slot.uniforms, 0, bytemuck::bytes_of(&frame.uniforms));
         let through = frame.uniforms.look[0] < 1.0;
-        slot.pass(encoder, &self.pipelines, frame.background, through);
+        let plain = shading.uniforms.is_plain();
+        let behind = if plain { frame.background } else { [0.0; 4] };
+        slot.pass(encoder, &self.pipelines, behind, through);
         if let Some(targets) = &mut slot.targets {
             let shade = &targets.shade;
             targets.shaded = shade.shade(queue, encoder, &self.shades, &shading.uniforms);
@@ -339,13 +341,13 @@ impl Targets {
         (shades, floor): (&ShadePipelines, &Arc<FloorShadow>),
         size: [u32; 2],
     ) -> Self {
-        let view = |format, sample_count, usage| {
+        let view = |format, sample_count, usage, share: u32| {
             device
                 .create_texture(&wgpu::TextureDescriptor {
                     label: Some("limb target"),
                     size: wgpu::Extent3d {
-                        width: size[0].max(1),
-                        height: size[1].max(1),
+                        width: size[0].max(1).div_ceil(share),
+                        height: size[1].max(1).div_ceil(share),
                         depth_or_array_layers: 1,
                     },
                     mip_level_count: 1,
@@ -359,9 +361,10 @@ impl Targets {
         };
         let none = wgpu::TextureUsages::empty();
         let bound = wgpu::TextureUsages::TEXTURE_BINDING;
-        let resolved = view(COLOR, 1, bound);
-        let depth = view(DEPTH, SAMPLES, bound);
-        let [left, finished] = ShadeTargets::FORMATS.map(|format| view(format, 1, bound));
+        let resolved = view(COLOR, 1, bound, 1);
+        let depth = view(DEPTH, SAMPLES, bound, 1);
+        let of = |(format, share)| view(format, 1, bound, share);
+        let [left, finished] = ShadeTargets::TEXTURES.map(of);
         let drawn = (&depth, &resolved);
         let shade = ShadeTargets::new((device, queue), shades, drawn, (left, finished), floor);
         let binds = [&resolved, shade.finished()].map(|picture| {
@@ -376,7 +379,7 @@ impl Targets {
         });
         Self {
             size,
-            color: view(COLOR, SAMPLES, none),
+            color: view(COLOR, SAMPLES, none, 1),
             depth,
             resolved,
             shade,

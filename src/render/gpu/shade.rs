@@ -7,8 +7,8 @@ use eframe::wgpu::{self, util::DeviceExt as _};
 use super::pipelines::COLOR;
 use crate::render::floor::{CELLS, FloorShadow};
 
-/// How much light is left in corners, of each pixel.
-const LEFT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
+/// How much light is left in corners and how far away that is, of every second pixel each way.
+const LEFT: wgpu::TextureFormat = wgpu::TextureFormat::Rg16Float;
 
 /// The uniforms of the shader, as it names them.
 #[repr(C)]
@@ -31,8 +31,8 @@ pub struct ShadeUniforms {
 }
 
 impl ShadeUniforms {
-    /// Whether there is anything to do.
-    fn is_plain(&self) -> bool {
+    /// Whether there is nothing to do: what is drawn is the picture then, and not drawn over nothing.
+    pub(super) fn is_plain(&self) -> bool {
         self.ambient[1] <= 0.0 && self.floor_middle[3] <= 0.0
     }
 }
@@ -195,8 +195,8 @@ impl ShadeTargets {
         }
     }
 
-    /// Of which textures they are made.
-    pub(super) const FORMATS: [wgpu::TextureFormat; 2] = [LEFT, COLOR];
+    /// Of which textures they are made, and how many of the picture's pixels one of theirs stands for, each way.
+    pub(super) const TEXTURES: [(wgpu::TextureFormat, u32); 2] = [(LEFT, 2), (COLOR, 1)];
 
     /// Whether they are of this floor.
     pub(super) fn stands_on(&self, floor: &Arc<FloorShadow>) -> bool {
