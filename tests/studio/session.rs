@@ -232,7 +232,8 @@ fn by_hand(w: &mut Window) {
     let (Some(quick), Some(exact)) = w.session().by_hand_error() else {
         panic!("both are known")
     };
-    assert!((quick / exact - 1.0).abs() < 0.5, "{quick} {exact}");
+    // The one is of all forces as a workshop builds it, the other of one force as designed.
+    assert!((0.5..2.0).contains(&(quick / exact)), "{quick} {exact}");
     judged_alike(w, exact);
     w.show("8-by-hand");
     // Pinned, it stays where it is in the next selection.
