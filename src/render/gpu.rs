@@ -34,6 +34,8 @@ pub struct Frame3d {
     pub map: ColorMap,
     pub uniforms: Uniforms,
     pub shading: Shading,
+    /// Whether a hand is moving what is seen.
+    pub hurried: bool,
     /// Red, green, blue, alpha, 0–1.
     pub background: [f64; 4],
     /// In pixels.
@@ -47,6 +49,8 @@ pub struct SceneGpu {
     scene_layout: wgpu::BindGroupLayout,
     blit_layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
+    /// Whether pictures are computed by the processor, which shades none while a hand waits for the next.
+    software: bool,
     slots: [SlotGpu; 2],
 }
 
@@ -88,13 +92,14 @@ struct Targets {
 
 /// Makes the pipelines once, where the window's callbacks find them.
 pub fn install(state: &RenderState) {
-    let scene = SceneGpu::new(&state.device, state.target_format);
+    let software = state.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+    let scene = SceneGpu::new(&state.device, state.target_format, software);
     state.renderer.write().callback_resources.insert(scene);
 }
 
 impl SceneGpu {
     #[must_use]
-    pub fn new(device: &wgpu::Device, window: wgpu::TextureFormat) -> Self {
+    pub fn new(device: &wgpu::Device, window: wgpu::TextureFormat, software: bool) -> Self {
         let scene_layout = layout(device, true);
         let blit_layout = layout(device, false);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
@@ -108,6 +113,7 @@ impl SceneGpu {
             scene_layout,
             blit_layout,
             sampler,
+            software,
             slots: [SlotGpu::new(device), SlotGpu::new(device)],
         }
     }
@@ -124,7 +130,12 @@ impl SceneGpu {
         let uploaded = slot.upload(device, queue, frame);
         tally::count(Done::Upload, usize::from(uploaded));
         let shading = &frame.shading;
-        let looks = (frame.uniforms, shading.uniforms);
+        let shades = if self.software && frame.hurried {
+            bytemuck::Zeroable::zeroed()
+        } else {
+            shading.uniforms
+        };
+        let looks = (frame.uniforms, shades);
         let signature = (looks.0, looks.1, frame.map, frame.size, frame.background);
         let fits = |t: &Targets| t.size == frame.size && t.shade.stands_on(&shading.floor);
         let fits = slot.targets.as_ref().is_some_and(fits);
@@ -132,8 +143,8 @@ impl SceneGpu {
             return;
         }
         if !fits {
-            let shades = (&self.shades, &shading.floor);
-            let targets = Targets::new((device, queue), &self.blit_layout, shades, frame.size);
+            let with = (&self.shades, &shading.floor);
+            let targets = Targets::new((device, queue), &self.blit_layout, with, frame.size);
             slot.targets = Some(targets);
         }
         if slot
@@ -153,12 +164,12 @@ impl SceneGpu {
         }
         queue.write_buffer(&slot.uniforms, 0, bytemuck::bytes_of(&frame.uniforms));
         let through = frame.uniforms.look[0] < 1.0;
-        let plain = shading.uniforms.is_plain();
+        let plain = shades.is_plain();
         let behind = if plain { frame.background } else { [0.0; 4] };
         slot.pass(encoder, &self.pipelines, behind, through);
         if let Some(targets) = &mut slot.targets {
             let shade = &targets.shade;
-            targets.shaded = shade.shade(queue, encoder, &self.shades, &shading.uniforms);
+            targets.shaded = shade.shade(queue, encoder, &self.shades, &shades);
         }
         slot.drawn = Some(signature);
         tally::count(Done::Redraw, 1);

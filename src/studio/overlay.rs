@@ -51,6 +51,7 @@ pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
         uniforms,
         shading: shading(look, pixels(ui, rect), back),
+        hurried: ui.input(|i| i.pointer.any_down()),
         background: back.to_array().map(|c| f64::from(c) / 255.0),
         size: pixels(ui, rect),
     };
@@ -159,6 +160,7 @@ pub fn paint_unrolled(look: LimbLook<'_>, ui: &Ui, rect: Rect) {
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
         uniforms,
         shading: unshaded(look),
+        hurried: false,
         background: back.to_array().map(|c| f64::from(c) / 255.0),
         size: pixels(ui, rect),
     };
