@@ -103,7 +103,7 @@ fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
 @vertex
 fn vs_edge(v: Vertex) -> Fragment {
     var f = placed(v);
-    f.clip.z -= 0.00006 * f.clip.w;
+    f.clip.z -= 0.000015 * f.clip.w;
     return f;
 }
 

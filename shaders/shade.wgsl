@@ -7,7 +7,8 @@
 struct Shade {
     inverse: mat4x4f,   // from clip space to relative units
     eye: vec4f,         // xyz: the eye (relative units), w: pixels of one unit at the distance one
-    ambient: vec4f,     // x: how far off walls take light (relative units), y: how much of it, z: light on the floor
+    ambient: vec4f,     // x: how far off walls take light (relative units), y: how much of it, z: light on the floor,
+                        // w: no more pixels are looked over than these
     background: vec4f,  // premultiplied with alpha
     floor_middle: vec4f, // xyz: its middle (relative units), w: how dark its shadow is
     floor_right: vec4f, // xyz: along its map, a unit over half of its side
@@ -72,7 +73,7 @@ fn fs_obscurance(@builtin(position) place: vec4f) -> @location(0) vec4f {
     if (dot(n, to_eye) < 0.0) { n = -n; }
 
     let radius = shade.ambient.x;
-    let reach = clamp(radius * shade.eye.w / length(to_eye), 4.0, 96.0);
+    let reach = clamp(radius * shade.eye.w / length(to_eye), 4.0, shade.ambient.w);
     // Each of four neighbours looks between what the others look at; their mean has no pattern.
     let quarter = f32((half.x & 1) + 2 * (half.y & 1)) / 4.0;
     var sum = 0.0;
@@ -100,7 +101,7 @@ fn light_left(pixel: vec2i) -> f32 {
     var sum = vec2f(0.0);
     for (var k = 0; k < 4; k++) {
         let other = textureLoad(obscurance, clamp(first + vec2i(k & 1, k >> 1), vec2i(0), most), 0).xy;
-        let weight = select(0.0, 1.0, abs(other.y - own) < 0.25 * shade.ambient.x);
+        let weight = select(0.0, 1.0, abs(other.y - own) < max(0.25 * shade.ambient.x, 0.002));
         sum += vec2f(other.x, 1.0) * weight;
     }
     return select(sum.x / sum.y, 1.0, sum.y < 0.5);
@@ -117,7 +118,7 @@ fn floor_at(pixel: vec2i) -> vec2f {
     let at = vec2f(dot(off, shade.floor_right.xyz), dot(off, shade.floor_front.xyz));
     if (max(abs(at.x), abs(at.y)) >= 1.0) { return vec2f(0.0); }
     let dark = textureSampleLevel(floor_map, floor_sampler, 0.5 + 0.5 * at, 0.0).x;
-    return vec2f(dark * shade.floor_middle.w, shade.ambient.z * smoothstep(1.0, 0.0, length(at)));
+    return vec2f(dark * shade.floor_middle.w, shade.ambient.z * (1.0 - smoothstep(0.0, 1.0, length(at))));
 }
 
 // The limb was drawn over nothing: its alpha is how much of a pixel it covers.

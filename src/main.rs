@@ -85,7 +85,7 @@ fn open_studio(cli: &Cli) -> anyhow::Result<()> {
 fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
     use cli::render::{BackdropArg, ViewArg};
     use hapdef::render::camera::Preset;
-    use hapdef::studio::picture::{Backdrop, Picture, png, turning};
+    use hapdef::studio::picture::{Backdrop, Floor, Picture, png, turning};
 
     let picture = Picture {
         size: args.size.0,
@@ -102,6 +102,11 @@ fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
             (true, _) => Backdrop::Transparent,
             (false, BackdropArg::Dark) => Backdrop::Dark,
             (false, BackdropArg::Neutral) => Backdrop::Neutral,
+        },
+        floor: if args.no_floor {
+            Floor::Nothing
+        } else {
+            Floor::Shadow
         },
     };
     let loaded = args.common().load()?;

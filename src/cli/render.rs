@@ -23,6 +23,9 @@ pub struct RenderArgs {
     /// Leave the background transparent.
     #[arg(long, conflicts_with = "backdrop")]
     pub transparent: bool,
+    /// Leave the limb's shadow on the floor out.
+    #[arg(long)]
+    pub no_floor: bool,
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
     pub unit: Option<UnitArg>,

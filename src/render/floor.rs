@@ -1,7 +1,6 @@
 //! The soft shadow of a part on the floor below it.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
@@ -63,7 +62,7 @@ impl FloorShadow {
             ((1.0 - (-0.5 * sky).exp()) * rim * 255.0).round() as u8
         };
         Self {
-            dark: (0..CELLS * CELLS).into_par_iter().map(taken).collect(),
+            dark: (0..CELLS * CELLS).map(taken).collect(),
             middle,
             half,
             stance,

@@ -56,7 +56,11 @@ impl Session {
             // One listens to a board, and only one.
             self.disconnect();
         }
-        let inbox = self.bench.take_orders(matches!(by, PressedBy::Hand(_)));
+        let by_hand = matches!(by, PressedBy::Hand(_));
+        if by_hand {
+            self.desk.bench.told_n = self.desk.bench.asked.force_n;
+        }
+        let inbox = self.bench.take_orders(by_hand);
         let pressing = Arc::clone(&self.bench.pressing);
         let inputs = begin.inputs.clone();
         let held = HoldGuard::new(&self.bench.runs);

@@ -424,7 +424,10 @@ pub fn enabled(session: &Session, view: &ViewState, command: UiCommand) -> bool 
         UiCommand::PausePresses | UiCommand::HaltMachine => {
             session.bench.goes_on() && !session.bench.by_hand()
         }
-        UiCommand::TakePress => session.bench.step() == Some(HandStep::TellForce),
+        // Nobody takes a force that is not seen.
+        UiCommand::TakePress => {
+            view.stage == Stage::Bench && session.bench.step() == Some(HandStep::TellForce)
+        }
         UiCommand::SkipPress => session
             .bench
             .step()

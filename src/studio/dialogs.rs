@@ -8,7 +8,7 @@ use egui::Context;
 use super::action::{Action, FileAction, WindowAction};
 use super::ask::Ask;
 use super::commands::UiCommand;
-use super::view::{Backdrop, Picture};
+use super::view::{Backdrop, Floor, Picture};
 use crate::document::Document;
 use crate::io::examples::Example;
 use crate::io::mesh_file::{ENDINGS, may_say_unit, needs_unit};
@@ -388,6 +388,7 @@ impl Dialog {
             size: self.size,
             view: None,
             backdrop: self.backdrop,
+            floor: Floor::default(),
         }
     }
 }

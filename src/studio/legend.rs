@@ -208,7 +208,7 @@ fn field_hint(look: LimbLook<'_>) -> &'static str {
         {
             "Computing the field …"
         }
-        _ if look.view.stage == Stage::Bench && look.session.bench.step().is_some() => {
+        _ if look.view.stage == Stage::Bench && look.session.bench.takes_place() => {
             "Click: where it is pressed   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
         }
         _ => {

@@ -63,6 +63,8 @@ pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
 fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shading {
     /// How far off walls take light, over the part's size.
     const REACH: f64 = 0.07;
+    /// Of the picture's height: so far is looked over at most, however near the limb is.
+    const WIDEST: f32 = 0.1;
     /// Of white.
     const FLOOR_LIGHT: f32 = 0.1;
     let (camera, floor) = (&look.view.camera, &look.scene.floor);
@@ -85,7 +87,7 @@ fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shad
                 .as_vec3()
                 .extend(camera.scale(height))
                 .to_array(),
-            ambient: [reach as f32, ambient, light, 0.0],
+            ambient: [reach as f32, ambient, light, WIDEST * height as f32],
             background: back.to_array().map(|c| f32::from(c) / 255.0),
             floor_middle: relative(floor.middle - camera.target)
                 .extend(dark)

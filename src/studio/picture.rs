@@ -18,7 +18,7 @@ use crate::render::camera::Camera;
 use crate::render::{gpu, offscreen};
 use crate::session::{Session, Task, Wake};
 
-pub use super::view::{Backdrop, Picture};
+pub use super::view::{Backdrop, Floor, Picture};
 
 /// Height of the window, in points, that a picture is drawn like: gauges and letters grow with the pixels.
 const POINTS: f32 = 720.0;
@@ -82,6 +82,7 @@ impl Easel {
         theme::apply(&ctx);
         let session = Session::new(Document::new(loaded, None), Wake::default());
         let mut view = ViewState::of(&session.document);
+        view.floor = picture.floor;
         let scene = PartScene::of(&session.document, &session.shape);
         if let Some(preset) = picture.view {
             view.camera.look_from(preset);

@@ -4,7 +4,7 @@ use egui::{PointerButton, Pos2, Response, Ui};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::action::{BenchAction, BoardAction, Compute, HandAction, History};
+use super::action::{Action, BenchAction, BoardAction, Compute, HandAction, History};
 use super::ask::Ask;
 use super::paint::exaggeration;
 use super::scene::{PartScene, pick_on};
@@ -154,20 +154,30 @@ fn let_go(scene: &PartScene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane) {
 
 fn press(scene: &PartScene, ask: &mut Ask<'_>, pane: Pane, at: Option<Pos2>) {
     let Some(place) = at.and_then(|at| pick_shown(scene, ask, pane, at)) else {
-        return ask.act(Compute::LetGo);
+        // Beside the limb: it is pressed where it was asked for after all.
+        return ask.act(if says_place(ask) {
+            BenchAction::Hand(HandOrder::Elsewhere(None)).into()
+        } else {
+            Action::from(Compute::LetGo)
+        });
     };
     if clicks_known_touches(ask) {
         let at = ask.session.document.inputs().part.point(place);
         return ask.act(BoardAction::AskKnownAt(at));
     }
-    if ask.view.stage == Stage::Bench && ask.session.bench.step().is_some() {
+    if says_place(ask) {
         let at = ask.session.document.inputs().part.point(place);
-        return ask.act(BenchAction::Hand(HandOrder::Elsewhere(at)));
+        return ask.act(BenchAction::Hand(HandOrder::Elsewhere(Some(at))));
     }
     ask.act(Compute::Press(place));
     if !matches!(ask.view.field, Field::Strain | Field::Displacement) {
         ask.view.field = Field::Strain;
     }
+}
+
+/// Whether a click on the limb says where it is pressed by hand.
+fn says_place(ask: &Ask<'_>) -> bool {
+    ask.view.stage == Stage::Bench && ask.session.bench.takes_place()
 }
 
 /// Whether a click on the limb says where the next known touch is pressed.

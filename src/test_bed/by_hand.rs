@@ -24,8 +24,8 @@ pub enum HandOrder {
     Force(f64),
     /// As hard as was meant.
     AsMeant,
-    /// It is pressed there (m) and not where it was asked for.
-    Elsewhere(DVec3),
+    /// It is pressed there (m) and not where it was asked for; or there after all.
+    Elsewhere(Option<DVec3>),
     /// Leaves this place out for now.
     Skip,
     /// Ends the run; what was pressed is kept.
@@ -42,8 +42,10 @@ pub enum HandSays {
         all: usize,
         at: DVec3,
     },
-    /// It is taken to be pressed there (m).
-    Moved(DVec3),
+    /// It is taken to be pressed there (m), or where it was asked for.
+    Moved(Option<DVec3>),
+    /// The board says nothing, or its rest is taken anew: nothing is to be pressed.
+    Wait,
     /// Where it is said to be pressed (m) there is no wall.
     OffTheWall(DVec3),
     /// It was read, and may be let go.
@@ -73,7 +75,9 @@ impl HandSays {
                 "press {which} of {all}: at {} with about {meant_n} N; hold it for a second",
                 place(*at)
             ),
-            Self::Moved(at) => format!("this one is at {}", place(*at)),
+            Self::Moved(Some(at)) => format!("this one is at {}", place(*at)),
+            Self::Moved(None) => "this one is where it was asked for".into(),
+            Self::Wait => "leave the limb alone until the board's rest is taken anew".into(),
             Self::OffTheWall(at) => {
                 format!("{} is not on the limb, and was passed over", place(*at))
             }
@@ -186,7 +190,7 @@ impl HandRun {
                 SessionEvent::Hello(hello) => desk.recorder.hello(hello),
                 // What was felt before is over, and its clock may begin anew.
                 SessionEvent::State(state) if *state != ConnectionState::Live => {
-                    (desk.presses, desk.passed) = (HandPresses::default(), false);
+                    desk.wait(&mut tell);
                 }
                 SessionEvent::Message(text) | SessionEvent::Trouble(text) => {
                     tell(HandSays::Board(text.to_owned()));
@@ -282,6 +286,21 @@ impl<'a> HandDesk<'a> {
                 all,
                 at: self.run.places[number].0,
             });
+            // Both may have been there before it was asked for.
+            if self.elsewhere.is_some() {
+                tell(HandSays::Moved(self.elsewhere));
+            }
+            if self.over.is_some() && self.order.is_none() {
+                tell(HandSays::HowHard);
+            }
+        }
+    }
+
+    /// Nothing can be pressed until there is a rest again.
+    fn wait(&mut self, tell: &mut dyn FnMut(HandSays)) {
+        (self.presses, self.passed) = (HandPresses::default(), false);
+        if self.prompted.take().is_some() {
+            tell(HandSays::Wait);
         }
     }
 
@@ -292,6 +311,8 @@ impl<'a> HandDesk<'a> {
         }
         match news {
             HandNews::Read => tell(HandSays::LetGo),
+            // A bump while the force of the press before is waited for.
+            HandNews::Unsteady if self.over.is_some() => tell(HandSays::HowHard),
             HandNews::Unsteady => {
                 // What was said ahead is of this place still.
                 if !self.ahead {
@@ -340,15 +361,19 @@ impl<'a> HandDesk<'a> {
         }
     }
 
-    fn move_to(&mut self, place: DVec3, tell: &mut dyn FnMut(HandSays)) {
+    fn move_to(&mut self, place: Option<DVec3>, tell: &mut dyn FnMut(HandSays)) {
         self.order = None;
+        let Some(place) = place else {
+            self.elsewhere = None;
+            return tell(HandSays::Moved(None));
+        };
         let part = &self.run.inputs.part;
         if check_on_part(part, "place", std::iter::once(place)).is_err() {
             return tell(HandSays::OffTheWall(place));
         }
         let (at, _) = on_wall(&self.run.sensing, place);
         self.elsewhere = Some(at);
-        tell(HandSays::Moved(at));
+        tell(HandSays::Moved(self.elsewhere));
     }
 
     fn go_on(&mut self) {

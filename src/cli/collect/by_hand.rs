@@ -97,6 +97,9 @@ fn read_lines(orders: &Sender<HandOrder>) {
 }
 
 fn order_of(line: &str) -> Option<HandOrder> {
+    if line == "at" {
+        return Some(HandOrder::Elsewhere(None));
+    }
     if let Some(place) = line.strip_prefix("at ") {
         let numbers: Vec<f64> = place
             .split([' ', ','])
@@ -106,7 +109,7 @@ fn order_of(line: &str) -> Option<HandOrder> {
         let &[x, y, z] = &numbers[..] else {
             return None;
         };
-        return Some(HandOrder::Elsewhere(DVec3::new(x, y, z) * 1e-3));
+        return Some(HandOrder::Elsewhere(Some(DVec3::new(x, y, z) * 1e-3)));
     }
     match line {
         "" => Some(HandOrder::AsMeant),

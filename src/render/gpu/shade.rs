@@ -18,7 +18,8 @@ pub struct ShadeUniforms {
     pub inverse: [[f32; 4]; 4],
     /// xyz: the eye (relative units); w: pixels of one unit at the distance one.
     pub eye: [f32; 4],
-    /// x: how far off walls take light (relative units); y: how much of it, 0 for none; z: what falls on the floor.
+    /// x: how far off walls take light (relative units); y: how much of it, 0 for none; z: what falls on the floor;
+    /// w: no more pixels are looked over than these.
     pub ambient: [f32; 4],
     /// Premultiplied with alpha.
     pub background: [f32; 4],

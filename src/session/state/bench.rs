@@ -119,6 +119,12 @@ impl Bench {
         hand.filter(|_| self.by_hand()).map(|(step, _)| step)
     }
 
+    /// Whether it can be said where the press of now is.
+    #[must_use]
+    pub fn takes_place(&self) -> bool {
+        self.step().is_some_and(|step| step != HandStep::Wait)
+    }
+
     /// Whether another run or plan may begin.
     #[must_use]
     pub fn is_free(&self) -> bool {

@@ -199,8 +199,9 @@ impl PressingPlan {
             }
             HandSays::Moved(at) => {
                 let step = self.hand.map_or(HandStep::Press, |(step, _)| step);
-                self.hand = Some((step, Some(*at)));
+                self.hand = Some((step, *at));
             }
+            HandSays::Wait => self.hand = Some((HandStep::Wait, moved)),
             HandSays::LetGo => self.hand = Some((HandStep::LetGo, moved)),
             HandSays::HowHard => self.hand = Some((HandStep::TellForce, moved)),
             HandSays::Taken(number, _) => self.set(*number, PressState::Made),

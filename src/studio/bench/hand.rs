@@ -1,5 +1,7 @@
 //! Pressing by hand: what is to be done next, and how hard the last press was.
 
+use std::cell::Cell;
+
 use egui::{DragValue, Frame, Key, RichText, Ui};
 
 use super::super::ask::Ask;
@@ -29,7 +31,7 @@ pub fn hand_form(ask: &mut Ask<'_>, ui: &mut Ui) {
             HandStep::LetGo => (
                 "Let go".to_owned(),
                 theme::STALE,
-                "It was read; click on the limb if it was elsewhere",
+                "It was read",
             ),
             HandStep::TellForce => (
                 "How hard was it?".to_owned(),
@@ -50,6 +52,14 @@ pub fn hand_form(ask: &mut Ask<'_>, ui: &mut Ui) {
 /// The force that a scale said, and the order that takes the press with it.
 fn told_row(ask: &mut Ask<'_>, ui: &mut Ui) {
     let mut entered = false;
+    // What is typed last: nothing is taken for a word that is no number.
+    let typed = Cell::new(true);
+    let parsed = |text: &str| {
+        let text = text.trim().trim_end_matches('N').trim_end();
+        let force = text.replace(',', ".").parse().ok();
+        typed.set(force.is_some());
+        force
+    };
     ui.horizontal(|ui| {
         ask.edit_desk(|desk| {
             let name = ui.label("Force");
@@ -57,13 +67,14 @@ fn told_row(ask: &mut Ask<'_>, ui: &mut Ui) {
                 .range(0.1..=1e4)
                 .speed(0.1)
                 .max_decimals(3)
+                .custom_parser(parsed)
                 .suffix(" N");
             let told = ui.add(told).labelled_by(name.id);
             entered = told.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
         });
         ask.button(ui, UiCommand::TakePress);
     });
-    if entered {
+    if entered && typed.get() {
         ask.command(UiCommand::TakePress);
     }
 }

@@ -304,6 +304,8 @@ pub struct Picture {
     /// The side to look from; three-quarters from above where there is none.
     pub view: Option<Preset>,
     pub backdrop: Backdrop,
+    /// What is below it, unless a window shows that.
+    pub floor: Floor,
 }
 
 /// What is below the limb.
