@@ -1,12 +1,10 @@
 //! The bench: what is asked of it, its plan, and who gives orders to whoever goes through that.
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::pressing::{HandStep, PressingPlan};
-use crate::document::SensingInputs;
 use crate::link::BenchOrder;
 use crate::test_bed::{BenchRequest, HandOrder};
 
@@ -45,14 +43,6 @@ impl Default for BenchDesk {
             told_n: BenchRequest::default().force_n,
         }
     }
-}
-
-/// What a plan is of.
-#[derive(Clone, PartialEq)]
-pub struct PlanInputs {
-    pub sensing: SensingInputs,
-    pub asked: BenchRequest,
-    pub folder: PathBuf,
 }
 
 /// To whoever presses: a machine or somebody.

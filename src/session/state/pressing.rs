@@ -1,12 +1,21 @@
 //! A plan of presses: how each of them stands, and what whoever presses by hand is waited for.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::bench::PlanInputs;
 use crate::bench::{CollectorNews, RunEnd};
-use crate::test_bed::{HandRun, HandSays, Ready};
+use crate::document::SensingInputs;
+use crate::test_bed::{BenchRequest, HandRun, HandSays, Ready};
+
+/// What a plan is of.
+#[derive(Clone, PartialEq)]
+pub struct PlanInputs {
+    pub sensing: SensingInputs,
+    pub asked: BenchRequest,
+    pub folder: PathBuf,
+}
 
 /// How a press stands.
 #[derive(Clone, Debug, PartialEq, Eq)]

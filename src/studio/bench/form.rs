@@ -17,13 +17,13 @@ const NAMED: usize = 5;
 
 /// What goes through the plan.
 #[derive(Clone, Copy, PartialEq)]
-enum Presser {
+enum WhoPresses {
     Simulated,
     Machine,
     Hand,
 }
 
-impl Presser {
+impl WhoPresses {
     const ALL: [Self; 3] = [Self::Simulated, Self::Machine, Self::Hand];
 
     fn of(asked: &BenchRequest) -> Self {
@@ -89,7 +89,7 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
 
 /// What a run that goes on is told.
 fn order_buttons(ask: &mut Ask<'_>, ui: &mut Ui) {
-    if Presser::of(&ask.session.desk.bench.asked) == Presser::Hand {
+    if WhoPresses::of(&ask.session.desk.bench.asked) == WhoPresses::Hand {
         hand_form(ask, ui);
         ask.button(ui, UiCommand::StopPresses);
         return;
@@ -127,29 +127,29 @@ fn halt_button(ask: &mut Ask<'_>, ui: &mut Ui) {
 
 fn presser_rows(ui: &mut Ui, desk: &mut BenchDesk, baud: &mut u32) {
     rows(ui, "Pressed by", |ui| {
-        let mut presser = Presser::of(&desk.asked);
+        let mut presser = WhoPresses::of(&desk.asked);
         let help = "Printer, limb as a workshop builds it and board may all be computed, as fast as that goes; or a printer presses; or you do, where the limb shows it";
         choice(
             ui,
             "Who presses",
             &mut presser,
-            &Presser::ALL,
-            Presser::name,
+            &WhoPresses::ALL,
+            WhoPresses::name,
             help,
         );
-        if presser != Presser::of(&desk.asked) {
+        if presser != WhoPresses::of(&desk.asked) {
             presser.put(&mut desk.asked);
         }
-        if presser == Presser::Hand {
+        if presser == WhoPresses::Hand {
             text_row(ui, "Force sensor", &mut desk.machine, "none: a scale tells");
         } else {
             text_row(ui, "Machine file", &mut desk.machine, "the paper's bench");
         }
-        if presser == Presser::Machine {
+        if presser == WhoPresses::Machine {
             text_row(ui, "Printer", &mut desk.printer, "port or host:port");
             baud_row(ui, "Printer's baud", &mut desk.printer_baud);
         }
-        if presser != Presser::Simulated {
+        if presser != WhoPresses::Simulated {
             text_row(ui, "Board", &mut desk.board, "port or host:port");
             baud_row(ui, "Board's baud", baud);
         }
