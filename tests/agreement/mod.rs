@@ -20,9 +20,10 @@ fn budget() -> Budget {
     Quality::Draft.budget()
 }
 
-/// Standard normal.
+/// Standard normal, by Box and Muller.
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    rng.sample(rand_distr::StandardNormal)
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 /// A set of gauges, as sites of the dataset.

@@ -40,7 +40,8 @@ pub fn lab() -> &'static Lab {
 }
 
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    rng.sample(rand_distr::StandardNormal)
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 /// Touches away from the held ends.

@@ -123,12 +123,11 @@ fn from_the_plan_to_live_touch() {
     ];
     let trained = said(folder, &train);
     // Presses on held bosses hardly move a gauge: they are found anywhere, and are in the mean. Half of all are found as near
-    // as this, by an estimator that knows nothing of the limb and has 240 places of it, ten millimetres apart: over five splits of
-    // thirty held-out places each 5.1 to 8.9 mm, and 5.5 to 10.0 in the paper's row.
-    assert!(trained["median_mm"].as_f64() < Some(9.5), "{trained}");
+    // as this, by an estimator that knows nothing of the limb.
+    assert!(trained["median_mm"].as_f64() < Some(5.0), "{trained}");
     let by_force = trained["by_force"].as_array().unwrap();
     let paper = by_force.iter().find(|row| row["from_n"] == 9.8).unwrap();
-    assert!(paper["mean_mm"].as_f64() < Some(10.5), "{trained}");
+    assert!(paper["mean_mm"].as_f64() < Some(5.9), "{trained}");
     live(folder, 15.0);
     taught(folder, median(&trained));
     live(folder, 1.5);
