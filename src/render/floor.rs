@@ -76,7 +76,9 @@ impl Piece {
         let way = self.at - from;
         let squared = way.length_squared();
         let above = way.dot(up).max(0.0);
-        self.facing.dot(way).abs() * above / (std::f64::consts::PI * squared * squared)
+        // From near by as a disc of its area.
+        let disc = self.facing.length() / std::f64::consts::PI;
+        self.facing.dot(way).abs() * above / (std::f64::consts::PI * squared * (squared + disc))
     }
 }
 
@@ -93,7 +95,7 @@ fn pieces(mesh: &TriMesh) -> Vec<Piece> {
             continue;
         }
         let corners = mesh.corners(triangle);
-        let parts = ((waiting / share) as usize).min(64);
+        let parts = ((waiting / share) as usize).min(PIECES);
         for k in 0..parts {
             // Evenly over the triangle (M. Roberts' sequence, folded over the diagonal).
             let [mut u, mut v] =
@@ -129,9 +131,12 @@ mod tests {
         for p in &mut positions {
             p.z += height;
         }
-        // So small that it takes nothing, it holds the floor down.
-        positions
-            .extend([[0.0, 0.0], [1e-7, 0.0], [0.0, 1e-7]].map(|[x, y]| DVec3::new(x, y, 0.0)));
+        // A foot below a corner, so small that it takes next to nothing, holds the floor down.
+        positions.extend([
+            at(-0.9, -0.9, 0.0),
+            at(-0.89, -0.9, 0.0),
+            at(-0.9, -0.89, 0.0),
+        ]);
         let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6]];
         TriMesh::new(&positions, &triangles, 0).unwrap().0
     }
