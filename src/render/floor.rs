@@ -117,48 +117,36 @@ fn pieces(mesh: &TriMesh) -> Vec<Piece> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::stance::Stance;
 
-    /// A level square of a side of 20 mm, at some height (m) above a point of the floor.
-    fn plate(height: f64) -> TriMesh {
-        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 0.01;
-        let mut positions = vec![
-            at(-1.0, -1.0, 0.0),
-            at(1.0, -1.0, 0.0),
-            at(1.0, 1.0, 0.0),
-            at(-1.0, 1.0, 0.0),
-        ];
-        for p in &mut positions {
-            p.z += height;
-        }
-        // A foot below a corner, so small that it takes next to nothing, holds the floor down.
-        positions.extend([
-            at(-0.9, -0.9, 0.0),
-            at(-0.89, -0.9, 0.0),
-            at(-0.9, -0.89, 0.0),
-        ]);
-        let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6]];
-        TriMesh::new(&positions, &triangles, 0).unwrap().0
-    }
-
-    fn at_the_middle(shadow: &FloorShadow) -> u8 {
-        shadow.dark[CELLS / 2 * CELLS + CELLS / 2]
+    /// A level square of a side of 20 mm.
+    fn plate() -> TriMesh {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let positions = corners.map(|[x, y]| DVec3::new(x, y, 0.0) * 0.01);
+        TriMesh::new(&positions, &[[0, 1, 2], [0, 2, 3]], 0)
+            .unwrap()
+            .0
     }
 
     #[test]
-    fn a_plate_darkens_what_is_below_it_and_less_the_higher_it_is() {
-        let stance = Stance::about(DVec3::Z);
-        let [low, high] = [0.004, 0.02].map(|height| FloorShadow::of(&plate(height), stance));
-        let corner = low.dark[0];
-        assert!(corner < 8, "{corner}");
-        let (near, far) = (at_the_middle(&low), at_the_middle(&high));
-        assert!(near > far && far > 20, "{near} {far}");
-        // As a view factor says it: a square of half a side a, at a height h, over its middle.
-        let ratio: f64 = 0.01 / (0.02 + 0.015 * 0.02);
-        let slant = ratio / (1.0 + ratio * ratio).sqrt();
-        let factor = 4.0 / std::f64::consts::PI * slant * slant.atan();
-        let expected = (1.0 - (-0.5 * factor).exp()) * 255.0;
-        // The cell that is asked is half a cell beside the middle, where next to nothing fades.
-        assert!((f64::from(far) - expected).abs() < 4.0, "{far} {expected}");
+    fn pieces_take_what_the_view_factor_of_a_square_says() {
+        let pieces = pieces(&plate());
+        for below in [0.004, 0.01, 0.02] {
+            let from = DVec3::Z * -below;
+            let taken: f64 = pieces.iter().map(|p| p.taken_from(from, DVec3::Z)).sum();
+            // Of a square of half a side a, over its middle at a distance h.
+            let ratio: f64 = 0.01 / below;
+            let slant = ratio / (1.0 + ratio * ratio).sqrt();
+            let factor = 4.0 / std::f64::consts::PI * slant * slant.atan();
+            assert!((taken / factor - 1.0).abs() < 0.03, "{taken} {factor}");
+        }
+    }
+
+    #[test]
+    fn it_is_dark_below_a_part_and_not_beside_it() {
+        let shadow = FloorShadow::of(&plate(), Stance::about(DVec3::Z));
+        let at = |x: usize, y: usize| shadow.dark[y * CELLS + x];
+        let middle = CELLS / 2;
+        assert!(at(middle, middle) > 60, "{}", at(middle, middle));
+        assert!(at(0, 0) == 0 && at(middle, 2) < at(middle, middle) / 4);
     }
 }
