@@ -24,6 +24,7 @@ pub struct FloorShadow {
 
 /// A piece of the surface.
 struct Piece {
+    /// m.
     at: DVec3,
     /// Its normal times its area (m²).
     facing: DVec3,
