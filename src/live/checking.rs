@@ -9,6 +9,12 @@ use crate::statistics::median;
 const LOOK_S: f64 = 0.2;
 /// With fewer gauges nothing is said of one of them.
 const FEWEST: usize = 5;
+/// Seconds of a touch before it is looked at: what it leaves on a gauge in the mean shows far better than in one sample.
+const STAYS_S: f64 = 0.05;
+/// A gauge whose mean under a touch is so many deviations off its rest, and this share of the others' rms, which may come
+/// over from them, feels something.
+const FELT: f64 = 6.0;
+const COMES_OVER: f64 = 0.02;
 /// A reading of less than this share of what it should be is none; one that should be less than this share of the others'
 /// rms proves nothing, nor one that is near the noise.
 const NONE: f64 = 0.2;
@@ -22,9 +28,38 @@ pub(super) struct Checking {
     watchers: Vec<Watcher>,
     pub health: Vec<Health>,
     last_look: u64,
+    since: TouchMean,
     /// Noise of most channels (counts), asked for anew after so many samples.
     usual: Option<f64>,
     until: u32,
+}
+
+/// What gauges have read since the last look, while something touches.
+#[derive(Default)]
+struct TouchMean {
+    begun_us: Option<u64>,
+    sum: Vec<f64>,
+    samples: f64,
+}
+
+impl TouchMean {
+    fn take(&mut self, time_us: u64, strain: &[f64]) {
+        if self.begun_us.is_none() {
+            (self.begun_us, self.sum) = (Some(time_us), vec![0.0; strain.len()]);
+            self.samples = 0.0;
+        }
+        for (sum, x) in self.sum.iter_mut().zip(strain) {
+            *sum += x;
+        }
+        self.samples += 1.0;
+    }
+
+    /// Whether a gauge's mean, of which the rms of all is `rms` (strain), is off its rest, known as well as that: its noise
+    /// in every sample and what the rest may be off by in all of them (strain).
+    fn is_felt(&self, gauge: usize, rms: f64, [noise, rest]: [f64; 2]) -> bool {
+        let deviation = (noise / self.samples.sqrt()).hypot(rest);
+        (self.sum[gauge] / self.samples).abs() > FELT * deviation + COMES_OVER * rms
+    }
 }
 
 /// Samples in which nobody's noise changes by much.
@@ -37,6 +72,7 @@ impl Checking {
             watchers: vec![Watcher::default(); gauges],
             health: vec![Health::Good; gauges],
             last_look: 0,
+            since: TouchMean::default(),
             usual: None,
             until: 0,
         }
@@ -100,15 +136,29 @@ impl Checking {
         }
     }
 
-    /// Holds every gauge against what the others say of the one touch that there is.
-    pub fn look(&mut self, matching: &mut Matching, time_us: u64, strain: &[f64]) {
+    /// The touch is over.
+    pub fn end_touch(&mut self) {
+        self.since = TouchMean::default();
+    }
+
+    /// Holds every gauge against what the others say of the one touch that there is; `noise` (strain) is that of a single
+    /// sample of each.
+    pub fn look(
+        &mut self,
+        matching: &mut Matching,
+        time_us: u64,
+        (strain, noise): (&[f64], &[f64]),
+    ) {
         let used = matching.used.clone();
         let count = used.iter().filter(|u| **u).count();
-        let early = (time_us.saturating_sub(self.last_look) as f64) < LOOK_S * 1e6;
-        if early || count < FEWEST {
+        self.since.take(time_us, strain);
+        let since = |at: u64| time_us.saturating_sub(at) as f64 * 1e-6;
+        let stays = self.since.begun_us.is_some_and(|at| since(at) >= STAYS_S);
+        if since(self.last_look) < LOOK_S || !stays || count < FEWEST {
             return;
         }
         self.last_look = time_us;
+        let mean = std::mem::take(&mut self.since);
         let trusted = strain.iter().zip(&used).filter(|(_, u)| **u);
         let rms = (trusted.map(|(x, _)| x * x).sum::<f64>() / count as f64).sqrt();
         for k in 0..strain.len() {
@@ -116,9 +166,10 @@ impl Checking {
             if !trusted || strain[k].abs() > 3.0 * rms {
                 continue;
             }
-            let suspicious = strain[k].abs() < ABOVE_NOISE * matching.errors.noise[k] + CLEAR * rms;
+            let all = matching.errors.noise[k];
+            let rest = (all * all - noise[k] * noise[k]).max(0.0).sqrt();
             // Only one that says nothing, or was found dead, is worth asking the others about.
-            if !suspicious && used[k] {
+            if used[k] && mean.is_felt(k, rms, [noise[k], rest]) {
                 self.watchers[k].felt();
                 continue;
             }

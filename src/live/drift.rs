@@ -1,13 +1,8 @@
 //! How the rest of the channels wanders, also while something touches: a Kalman filter over time (R. E. Kalman, J. Basic
 //! Eng. 82, 1960).
 //!
-//! The rest b of all channels walks: each for itself, by glue and amplifier, all together along a pattern s, by
-//! temperature, and of what is loaded a share, by creep. In a time Δ
-//!
-//! ```text
-//! b ← b + s v Δ + w        w ~ N(0, (diag(q² + creep) + q_s² s sᵀ) Δ)
-//! v ← (1 - Δ/τ) v + w'     w' ~ N(0, q_v² Δ)
-//! ```
+//! The rest b of all channels walks ([`walk`]): each for itself, by glue and amplifier, all together at a speed, by
+//! temperature, and of what is loaded a share, by creep.
 //!
 //! Untouched, b is what is read. Under a touch, x = b + r̂ + J θ + n with r̂ its reading and J the ways in which it may be
 //! another touch: with so wide a spread of θ as makes them free, S = P + R + J Jᵀ, and the rest follows only what no
@@ -19,7 +14,7 @@ mod walk;
 
 use std::collections::VecDeque;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::inference::{SeveralTouches, TouchKind};
 
@@ -39,6 +34,10 @@ const BEFORE_S: f64 = 0.05;
 const STEADY: f64 = 5.0;
 const STEADY_BY: f64 = 1.5e-6;
 
+/// Under a touch, standard deviations of χ² beyond which what is left is of another touch than was found, and not of a
+/// rest that has moved: that goes slowly.
+const SUDDEN: f64 = 8.0;
+
 /// Of the variance that a touch leaves of the rest: what it hid is not to be taken for another touch.
 const CAUTION: f64 = 16.0;
 
@@ -51,14 +50,10 @@ struct RestBlock {
 
 /// What is known of the rest since a tare (strain), as of a little while ago, and what that says of now.
 pub(super) struct Drift {
-    /// b.
-    level: Vec<f64>,
-    /// P of the rest of every channel and, at the end, of the speed v (strain, strain a second).
-    covariance: DMatrix<f64>,
     walk: RestWalk,
     creep: Creep,
     misfit: Misfit,
-    /// Seconds since the tare, and as of when b and P are.
+    /// Seconds since the tare, and as of when the walk is.
     now_s: f64,
     as_of_s: f64,
     /// Samples that are being gathered since a time, and blocks that are not believed yet.
@@ -69,7 +64,7 @@ pub(super) struct Drift {
     /// Whether the last samples were of a touch, and whether any at rest were believed since the last one.
     under_touch: bool,
     believed: bool,
-    /// P as of now, and (P + R)⁻¹ of the channels that were used, row by row; zeros for the others. Then the same with
+    /// P of b as of now, and (P + R)⁻¹ of the channels that were used, row by row; zeros for the others. Then the same with
     /// caution.
     ahead: DMatrix<f64>,
     weights: [Vec<f64>; 2],
@@ -82,11 +77,8 @@ impl Drift {
     pub fn new(noise: &[f64], drift: &[f64], follows_s: f64, rate: f64) -> Self {
         let channels = noise.len();
         let walk = RestWalk::new(noise, drift, follows_s, rate);
-        let covariance = RestWalk::after_tare(noise);
         Self {
-            level: vec![0.0; channels],
-            ahead: covariance.clone(),
-            covariance,
+            ahead: walk.rest_covariance(0.0, false),
             walk,
             creep: Creep::new(channels),
             misfit: Misfit::default(),
@@ -110,14 +102,12 @@ impl Drift {
 
     /// The rest of every channel now (strain since the tare).
     pub fn rest(&self) -> impl Iterator<Item = f64> + '_ {
-        let along = self.walk.moves(self.now_s - self.as_of_s);
-        let pairs = self.level.iter().zip(&self.walk.pattern);
-        pairs.map(move |(level, s)| level + s * along)
+        self.walk.rest(self.now_s - self.as_of_s)
     }
 
     /// What every channel drifts by just now (strain a second).
     pub fn speeds(&self) -> impl Iterator<Item = f64> + '_ {
-        self.walk.drift()
+        self.walk.speeds()
     }
 
     /// Weighted squares of a reading without a touch, over the channels that are used: as χ². Then the same with caution: as
@@ -133,14 +123,13 @@ impl Drift {
         })
     }
 
-    /// Variance of each channel for itself and of all together (strain²): P ≈ diag(own) + common s sᵀ.
+    /// Variance of each channel for itself and of all together (strain²): P ≈ diag(own) + common.
     pub fn variances(&self) -> (Vec<f64>, f64) {
-        let (n, s) = (self.level.len(), &self.walk.pattern);
-        let shared = |(i, j): (usize, usize)| self.ahead[(i, j)] / (s[i] * s[j]);
+        let n = self.ahead.nrows();
         let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
         let count = (n * n.saturating_sub(1) / 2).max(1) as f64;
-        let common = (pairs.map(shared).sum::<f64>() / count).max(0.0);
-        let own = |i: usize| (self.ahead[(i, i)] - common * s[i] * s[i]).max(0.0);
+        let common = (pairs.map(|at| self.ahead[at]).sum::<f64>() / count).max(0.0);
+        let own = |i: usize| (self.ahead[(i, i)] - common).max(0.0);
         ((0..n).map(own).collect(), common)
     }
 
@@ -181,11 +170,13 @@ impl Drift {
             }
             self.believed = true;
             self.go_on_to(block.ends_s, None);
-            let off = block.mean.iter().zip(&self.level).map(|(x, b)| x - b);
-            let off: Vec<f64> = off.collect();
+            let off = block.mean.iter().zip(self.walk.rest(0.0));
+            let off: Vec<f64> = off.map(|(x, b)| x - b).collect();
             let variance: Vec<f64> = noise.iter().map(|n| n * n / block.samples).collect();
-            let correction = self.correct(&off, &variance, used, &[]);
-            self.walk.learn(&correction, &self.covariance, self.as_of_s);
+            let off = (&off[..], f64::INFINITY);
+            if let Some(correction) = self.walk.correct(off, &variance, used, &[]) {
+                self.walk.learn(&correction, self.as_of_s);
+            }
         }
     }
 
@@ -223,7 +214,7 @@ impl Drift {
             return false;
         };
         self.go_on_to(self.now_s, Some(reading));
-        for (x, rest) in mean.iter_mut().zip(&self.level) {
+        for (x, rest) in mean.iter_mut().zip(self.walk.rest(0.0)) {
             *x -= rest;
         }
         let beyond = match &touches.contacts[..] {
@@ -237,7 +228,10 @@ impl Drift {
         if let Some((off, doubt, ways)) = beyond {
             let noise = noise.iter().zip(&doubt);
             let variance: Vec<f64> = noise.map(|(n, d)| n * n / samples + d).collect();
-            self.correct(&off, &variance, used, &ways);
+            let off = (&off[..], SUDDEN);
+            if self.walk.correct(off, &variance, used, &ways).is_none() {
+                self.misfit.forget();
+            }
         }
         self.weigh(noise, used);
         true
@@ -278,24 +272,17 @@ impl Drift {
         Some((mean, samples))
     }
 
-    /// b and P as of another time, under a load (strain) until then, or none.
+    /// The rest as of another time, under a load (strain) until then, or none.
     fn go_on_to(&mut self, time_s: f64, load: Option<&[f64]>) {
         let seconds = (time_s - self.as_of_s).max(0.0);
         self.as_of_s = time_s;
-        let along = self.walk.moves(seconds);
-        for (level, s) in self.level.iter_mut().zip(&self.walk.pattern) {
-            *level += s * along;
-        }
-        let hidden = load.is_some();
-        self.walk.grow(&mut self.covariance, seconds, hidden);
-        self.walk.drifted(along, hidden);
-        self.creep.grow(&mut self.covariance, load, seconds);
+        self.walk.pass(seconds, load.is_some());
+        self.creep.grow(&mut self.walk.covariance, load, seconds);
     }
 
     fn weigh(&mut self, noise: &[f64], used: &[bool]) {
-        self.ahead = self.covariance.clone();
         let ahead_s = self.now_s - self.as_of_s;
-        self.walk.grow(&mut self.ahead, ahead_s, self.under_touch);
+        self.ahead = self.walk.rest_covariance(ahead_s, self.under_touch);
         // Whether anything touches is asked of what would be left if it let go now.
         let mut after = self.ahead.clone();
         self.creep.let_go(&mut after);
@@ -303,55 +290,6 @@ impl Drift {
         let hid = if self.creep.loaded { CAUTION } else { 1.0 };
         self.weights[1] = weights(&(after * hid), noise, used);
         self.weighed_for = used.to_vec();
-    }
-
-    /// Corrects the rest by what readings are off from it without a touch, with their variances (strain, strain²) and the
-    /// ways in which the touch may be another one. By how much (strain).
-    fn correct(
-        &mut self,
-        off: &[f64],
-        variance: &[f64],
-        used: &[bool],
-        ways: &[Vec<f64>],
-    ) -> Vec<f64> {
-        let n = off.len();
-        let trusted: Vec<usize> = (0..n).filter(|&k| used[k]).collect();
-        let mut inner = among(&self.covariance, &trusted);
-        for (k, &c) in trusted.iter().enumerate() {
-            inner[(k, k)] += variance[c];
-        }
-        for way in ways {
-            let way = DVector::from_iterator(trusted.len(), trusted.iter().map(|&c| way[c]));
-            inner.ger(1.0, &way, &way, 1.0);
-        }
-        let nothing = vec![0.0; n];
-        let Some(factor) = inner.cholesky() else {
-            return nothing;
-        };
-        let read = DVector::from_iterator(trusted.len(), trusted.iter().map(|&c| off[c]));
-        // Pᵀ of the channels that are read.
-        let seen = DMatrix::from_fn(trusted.len(), n + 1, |k, c| {
-            self.covariance[(trusted[k], c)]
-        });
-        let gain = factor.solve(&seen);
-        let correction = gain.tr_mul(&read);
-        if correction.iter().any(|c| !c.is_finite()) {
-            return nothing;
-        }
-        self.covariance -= seen.tr_mul(&gain);
-        // What rounding makes of it must stay a covariance.
-        for i in 0..=n {
-            for j in 0..i {
-                let mean = f64::midpoint(self.covariance[(i, j)], self.covariance[(j, i)]);
-                (self.covariance[(i, j)], self.covariance[(j, i)]) = (mean, mean);
-            }
-            self.covariance[(i, i)] = self.covariance[(i, i)].max(1e-20);
-        }
-        for (level, c) in self.level.iter_mut().zip(&correction) {
-            *level += c;
-        }
-        self.walk.speed += correction[n];
-        correction.iter().take(n).copied().collect()
     }
 }
 

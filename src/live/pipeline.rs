@@ -240,6 +240,7 @@ impl Pipeline {
     fn end_touch(&mut self) {
         self.feeling.end();
         self.counting.end();
+        self.checking.end_touch();
         (self.last, self.searched) = (None, 0);
         self.release.forget();
     }
@@ -289,7 +290,8 @@ impl Pipeline {
             [None; 3]
         };
         if self.last.is_some() && contact.is_some() {
-            (self.checking).look(&mut self.matching, sample.time_us, &strain);
+            let read = (&strain[..], &self.ground.noise[..]);
+            (self.checking).look(&mut self.matching, sample.time_us, read);
         }
         self.follow(
             [&raw, &strain],

@@ -2,284 +2,19 @@
 //! part is of finer elements than the listener's model is pressed and disturbed (`hapdef board --simulate --record`), and
 //! `hapdef listen` says what it feels.
 //!
-//! The bundled limb at Draft with its ten gauges; what the gauges are off by is said at each test.
+//! The bundled limb at Draft with its ten gauges, or with other ten (`HAPDEF_TEN`); what the gauges are off by is said at
+//! each test.
 
-use std::fmt::Write as _;
-use std::path::PathBuf;
-use std::process::Command;
+mod bench;
 
 use glam::DVec3;
-use hapdef::cli;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde_json::Value;
 
-use super::promise::{hapdef, text, with};
-
-const PROJECT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/limb.hapdef.toml");
-/// A touch that has ended is forgotten within so much (s).
-const LET_GO_S: f64 = 0.3;
-
-/// A press as a script says it.
-#[derive(Clone, Copy)]
-struct Press {
-    start_s: f64,
-    duration_s: f64,
-    place: DVec3,
-    force: f64,
-    ramp_ms: f64,
-    tilt_deg: f64,
-    towards_deg: f64,
-    radius_mm: f64,
-}
-
-impl Press {
-    fn new(start_s: f64, duration_s: f64, place: DVec3, force: f64) -> Self {
-        Self {
-            start_s,
-            duration_s,
-            place,
-            force,
-            ramp_ms: 80.0,
-            tilt_deg: 0.0,
-            towards_deg: 0.0,
-            radius_mm: 5.0,
-        }
-    }
-
-    /// When it is there in full and a moment has passed, a shorter one of a tap.
-    fn full_s(&self) -> std::ops::Range<f64> {
-        let ramp = 1e-3 * self.ramp_ms;
-        let moment = 0.12_f64.min(0.2 * self.duration_s);
-        self.start_s + ramp + moment..self.start_s + self.duration_s - ramp
-    }
-
-    fn goes_on_at(&self, time_s: f64) -> bool {
-        (self.start_s..self.start_s + self.duration_s + LET_GO_S).contains(&time_s)
-    }
-}
-
-/// What `listen` says of one sample.
-struct Heard {
-    time_s: f64,
-    kind: Option<String>,
-    /// The place (mm) by the estimator that was asked for.
-    place: Option<DVec3>,
-    /// By matching: places (mm), forces (N) and radii of the regions (mm), the hardest first.
-    touches: Vec<(DVec3, f64, f64)>,
-    channels_ok: u64,
-}
-
-impl Heard {
-    fn of(line: &str) -> Self {
-        let said: Value = serde_json::from_str(line).unwrap();
-        let number = |of: &Value, key: &str| of[key].as_f64().unwrap();
-        let touch = |t: &Value| {
-            let [x, y, z] = ["x_mm", "y_mm", "z_mm"].map(|key| number(t, key));
-            let at = DVec3::new(x, y, z);
-            (at, number(t, "force_n"), number(t, "uncertainty_mm"))
-        };
-        let [x, y, z] = ["x_mm", "y_mm", "z_mm"].map(|key| said[key].as_f64());
-        Self {
-            time_s: 1e-6 * number(&said, "t_us"),
-            place: x.zip(y).zip(z).map(|((x, y), z)| DVec3::new(x, y, z)),
-            kind: said["kind"].as_str().map(str::to_owned),
-            touches: said["touches"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .map(touch)
-                .collect(),
-            channels_ok: said["channels_ok"].as_u64().unwrap(),
-        }
-    }
-}
-
-/// A bench: a folder with projects, a script, and what a board sent.
-struct Bench {
-    folder: tempfile::TempDir,
-    presses: Vec<Press>,
-}
-
-impl Bench {
-    fn of(presses: Vec<Press>) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let limb = PathBuf::from(PROJECT).with_file_name("limb.glb");
-        std::fs::copy(limb, folder.path().join("limb.glb")).unwrap();
-        let bench = Self { folder, presses };
-        std::fs::write(bench.at("script.csv"), bench.script(0.0)).unwrap();
-        bench
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// The presses as a table; as somebody tells of them who is off by so much (mm), forces by 3 %.
-    fn script(&self, off_mm: f64) -> String {
-        let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let mut off = |most: f64| most * rng.random_range(-1.0..1.0);
-        let mut text = String::from(
-            "start_s,duration_s,x_mm,y_mm,z_mm,force_n,ramp_ms,tilt_deg,towards_deg,radius_mm\n",
-        );
-        for p in &self.presses {
-            let place = p.place + DVec3::new(off(off_mm), off(off_mm), off(off_mm));
-            let force = p.force * (1.0 + if off_mm > 0.0 { off(0.05) } else { 0.0 });
-            let _ = writeln!(
-                text,
-                "{:.4},{:.4},{:.4},{:.4},{:.4},{force:.4},{},{},{},{}",
-                p.start_s,
-                p.duration_s,
-                place.x,
-                place.y,
-                place.z,
-                p.ramp_ms,
-                p.tilt_deg,
-                p.towards_deg,
-                p.radius_mm
-            );
-        }
-        text
-    }
-
-    /// The bundled project with other values of some keys.
-    fn project(&self, keys: &[(&str, &str)]) -> PathBuf {
-        let bundled = std::fs::read_to_string(PROJECT).unwrap();
-        let changed = keys.iter().fold(bundled, |p, (key, to)| with(&p, key, to));
-        let path = self.at("told.hapdef.toml");
-        std::fs::write(&path, changed).unwrap();
-        path
-    }
-
-    /// The project of somebody who knows that no gauge is off, and how far touches drag along the surface.
-    fn exact(&self, friction_percent: &str) -> PathBuf {
-        self.project(&[
-            ("place_mm", "0.0"),
-            ("angle_deg", "0.0"),
-            ("gain_percent", "0.0"),
-            ("friction_percent", friction_percent),
-        ])
-    }
-
-    /// What a board sends while it is pressed.
-    fn record(&self, options: &[&str]) -> PathBuf {
-        self.record_at("draft", options)
-    }
-
-    /// The same, of a board whose limb is computed as finely as that.
-    fn record_at(&self, quality: &str, options: &[&str]) -> PathBuf {
-        let recording = self.at("board.hapdrec");
-        let script = self.at("script.csv");
-        let mut arguments = vec!["board", PROJECT, "--simulate", "--quality", quality];
-        arguments.extend(["--seed", "4", "--script", text(&script)]);
-        arguments.extend(["--record", text(&recording)]);
-        arguments.extend(options);
-        hapdef(&arguments);
-        recording
-    }
-
-    /// Samples of full presses, each with the press.
-    fn full<'a>(&'a self, heard: &'a [Heard]) -> impl Iterator<Item = (&'a Press, &'a Heard)> {
-        self.presses.iter().flat_map(move |press| {
-            let full = press.full_s();
-            let during = move |h: &&Heard| full.contains(&h.time_s);
-            heard.iter().filter(during).map(move |h| (press, h))
-        })
-    }
-
-    /// Share of the samples of full presses in which anything is felt.
-    fn felt(&self, heard: &[Heard]) -> f64 {
-        let (felt, all) = (self.full(heard)).fold((0, 0), |(felt, all), (_, h)| {
-            (felt + u32::from(!h.touches.is_empty()), all + 1_u32)
-        });
-        f64::from(felt) / f64::from(all)
-    }
-
-    /// Presses, by their number, of which a sample is not felt.
-    fn unfelt(&self, heard: &[Heard]) -> Vec<usize> {
-        let is_unfelt = |press: &Press| {
-            let full = press.full_s();
-            let mut during = heard.iter().filter(|h| full.contains(&h.time_s));
-            during.any(|h| h.touches.is_empty())
-        };
-        (0..self.presses.len())
-            .filter(|&k| is_unfelt(&self.presses[k]))
-            .collect()
-    }
-
-    /// Mean distance (mm) of the hardest touch that is heard from the press, and the share whose region holds it.
-    fn off(&self, heard: &[Heard]) -> (f64, f64) {
-        let found: Vec<(f64, f64)> = (self.full(heard))
-            .filter_map(|(press, h)| {
-                let &(at, _, radius) = h.touches.first()?;
-                Some((at.distance(press.place), radius))
-            })
-            .collect();
-        let count = found.len() as f64;
-        let mean = found.iter().map(|f| f.0).sum::<f64>() / count;
-        let held = found.iter().filter(|(off, radius)| off <= radius).count();
-        (mean, held as f64 / count)
-    }
-
-    /// Samples from some time on in which something is felt that is not there, be it unclear what.
-    fn ghosts(&self, heard: &[Heard], from_s: f64) -> usize {
-        let is_pressed = |time_s: f64| self.presses.iter().any(|p| p.goes_on_at(time_s));
-        let felt = (heard.iter()).filter(|h| h.time_s >= from_s && h.kind.is_some());
-        felt.filter(|h| !is_pressed(h.time_s)).count()
-    }
-}
-
-/// What is heard of a recording with a project, and what is said beside.
-fn listen(recording: &std::path::Path, project: &std::path::Path) -> (Vec<Heard>, String) {
-    listen_with(recording, project, &["--quality", "draft"])
-}
-
-fn listen_with(
-    recording: &std::path::Path,
-    project: &std::path::Path,
-    more: &[&str],
-) -> (Vec<Heard>, String) {
-    let done = Command::new(env!("CARGO_BIN_EXE_hapdef"))
-        .args(["listen", text(recording), "--fast"])
-        .args(["--project", text(project)])
-        .args(more)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(done.status.success(), "{said}");
-    let lines = String::from_utf8(done.stdout).unwrap();
-    (lines.lines().map(Heard::of).collect(), said)
-}
-
-/// So many places on the limb's outside (mm), one above another around it, off the held ends.
-fn places(count: usize) -> Vec<DVec3> {
-    const TRIED: usize = 300;
-    let part = cli::open(PROJECT.as_ref(), None).unwrap().inputs.part;
-    let mesh = part.as_given();
-    let on_the_limb = |k: usize| {
-        let angle = std::f64::consts::TAU * 0.381_966 * k as f64;
-        let z = 18.0 + 84.0 * (k as f64 + 0.5) / TRIED as f64;
-        let around = DVec3::new(31.85 * angle.cos(), 31.85 * angle.sin(), z) * 1e-3;
-        let place = mesh.point(mesh.index().nearest(around).0);
-        (place.distance(around) < 0.5e-3).then_some(place * 1e3)
-    };
-    let all: Vec<DVec3> = (0..TRIED).filter_map(on_the_limb).collect();
-    (0..count).map(|k| all[k * all.len() / count]).collect()
-}
-
-/// Presses one after another, each everywhere alike.
-fn in_turn(first_s: f64, every_s: f64, lasts_s: f64, places: &[DVec3], force: f64) -> Vec<Press> {
-    let press = |(k, place): (usize, &DVec3)| {
-        Press::new(first_s + every_s * k as f64, lasts_s, *place, force)
-    };
-    places.iter().enumerate().map(press).collect()
-}
-
-const BOARD: [&str; 6] = ["--rate", "200", "--bits", "16", "--workshop", "exact"];
-
-fn with_more<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    [&BOARD[..], more].concat()
-}
+use self::bench::{
+    BOARD, Bench, Heard, Press, hold, in_turn, listen, listen_with, places, with_more,
+};
+use super::promise::{hapdef, text};
 
 #[test]
 fn a_board_that_is_connected_under_a_press_is_no_ghost_for_ever() {
@@ -297,7 +32,10 @@ fn a_board_that_is_connected_under_a_press_is_no_ghost_for_ever() {
     let (felt, (off, _)) = (later.felt(&heard), later.off(&heard));
     let ghosts = bench.ghosts(&heard, 2.8);
     println!("{ghosts} ghosts, {felt:.3} felt, {off:.2} mm off");
-    assert!(ghosts == 0 && felt > 0.99 && off < 0.6);
+    hold(
+        ghosts == 0 && felt > 0.99 && off < 0.6,
+        "0.6 mm and no ghosts",
+    );
 }
 
 #[test]
@@ -318,9 +56,8 @@ fn steep_taps_lose_no_gauge() {
         println!(
             "{noise} microstrain: {least:?} gauges, {unfelt:?} not felt, {off:.2} mm, {ghosts} ghosts"
         );
-        // One release of the forty leaves something unclear behind, where noise is least.
-        assert!(least == Some(10) && ghosts < 150, "{ghosts}");
-        assert!(unfelt.is_empty() && off < 1.0);
+        hold(least == Some(10) && ghosts == 0, "ten gauges and no ghosts");
+        hold(unfelt.is_empty() && off < 1.0, "1 mm");
         std::fs::remove_file(recording).unwrap();
     }
 }
@@ -336,7 +73,7 @@ fn a_finger_that_pushes_aside_is_found() {
         let (heard, _) = listen(&bench.record(&BOARD), &bench.exact(friction));
         let (felt, (off, held)) = (bench.felt(&heard), bench.off(&heard));
         println!("{tilt} degrees: {felt:.3} felt, {off:.2} mm off, {held:.2} held");
-        assert!(felt > 0.99 && off < most && held > 0.7);
+        hold(felt > 0.99 && off < most && held > 0.7, "0.9 mm");
     }
 }
 
@@ -393,7 +130,10 @@ fn two_fingers_are_two_and_the_next_one_is_one() {
     let share = f64::from(right) / f64::from(all);
     let (off, wrong) = (mean(&off), mean(&wrong));
     println!("{share:.3} are two, {off:.2} mm and {wrong:.2} N off");
-    assert!(share > 0.95 && off < 1.0 && wrong < 0.8);
+    hold(
+        share > 0.95 && off < 1.0 && wrong < 0.8,
+        "two, 1 mm and 0.8 N",
+    );
     let after = Bench::of(bench.presses.iter().skip(2).step_by(3).copied().collect());
     let one = after
         .full(&heard)
@@ -402,7 +142,10 @@ fn two_fingers_are_two_and_the_next_one_is_one() {
     let share = one as f64 / after.full(&heard).count() as f64;
     let ((off, _), ghosts) = (after.off(&heard), bench.ghosts(&heard, 0.0));
     println!("then {share:.3} are one, {off:.2} mm off, {ghosts} ghosts");
-    assert!(share > 0.97 && off < 1.0 && ghosts == 0);
+    hold(
+        share > 0.97 && off < 1.0 && ghosts == 0,
+        "one, 1 mm and no ghosts",
+    );
 }
 
 #[test]
@@ -415,14 +158,46 @@ fn a_standing_touch_outlives_a_drift_and_light_ones_are_felt_under_it() {
     let (heard, _) = listen(&recording, &bench.exact("0.0"));
     let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
     println!("2 microstrain a second: {felt:.3} felt, {ghosts} ghosts");
-    assert!(felt > 0.99 && ghosts == 0);
+    hold(felt > 0.99 && ghosts == 0, "felt and no ghosts");
 
     let bench = Bench::of(in_turn(3.0, 2.0, 1.0, &places, 1.5));
     let recording = bench.record(&with_more(&["--warming", "5"]));
     let (heard, _) = listen(&recording, &bench.exact("0.0"));
     let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
     println!("5 microstrain a second: {felt:.3} felt, {ghosts} ghosts");
-    assert!(felt > 0.95 && ghosts == 0);
+    hold(felt > 0.95 && ghosts == 0, "felt and no ghosts");
+}
+
+/// The ten gauges of the bundled limb are kind to us: with these others a standing touch was lost after a minute and a half,
+/// or left ghosts, and a tap did so where noise is least.
+#[test]
+fn other_gauges_do_so_too() {
+    let places = places(40);
+    // It goes on for a while after the standing touch.
+    let standing = || {
+        let mut presses = vec![Press::new(3.0, 120.0, places[6], 1.0)];
+        presses.extend(in_turn(126.0, 2.0, 1.0, &places[..2], 1.5));
+        presses
+    };
+    for ten in ["library-0", "library-4"] {
+        let bench = Bench::on(Some(ten), standing());
+        let recording = bench.record(&with_more(&["--warming", "2"]));
+        let (heard, _) = listen(&recording, &bench.exact("0.0"));
+        let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
+        println!("{ten}, 2 microstrain a second: {felt:.3} felt, {ghosts} ghosts");
+        assert!(felt > 0.99 && ghosts == 0, "{ten}");
+    }
+    let mut taps = in_turn(3.0, 0.5, 0.12, &places, 8.0);
+    for (k, press) in taps.iter_mut().enumerate() {
+        press.ramp_ms = [2.0, 5.0, 10.0][k % 3];
+    }
+    let bench = Bench::on(Some("library-4"), taps);
+    let quiet = ["--rate", "1000", "--bits", "24", "--noise", "0.1"];
+    let recording = bench.record(&[&quiet[..], &["--workshop", "exact"]].concat());
+    let (heard, _) = listen(&recording, &bench.exact("0.0"));
+    let (unfelt, ghosts) = (bench.unfelt(&heard), bench.ghosts(&heard, 3.0));
+    println!("taps: {unfelt:?} not felt, {ghosts} ghosts");
+    assert!(unfelt.is_empty() && ghosts == 0);
 }
 
 #[test]
@@ -433,7 +208,7 @@ fn mains_hum_is_no_touch() {
         let (heard, _) = listen(&recording, &bench.exact("0.0"));
         let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
         println!("{hum}: {felt:.3} felt, {ghosts} ghosts");
-        assert!(felt > 0.99 && ghosts == 0);
+        hold(felt > 0.99 && ghosts == 0, "felt and no ghosts");
         std::fs::remove_file(recording).unwrap();
     }
 }
@@ -453,7 +228,7 @@ fn a_palm_is_an_area() {
     let wrong = |(press, h): &(&Press, &Heard)| (press.force - h.touches[0].1).abs();
     let wrong = areas.iter().map(wrong).sum::<f64>() / areas.len() as f64;
     println!("{share:.3} are areas, their forces {wrong:.2} N off");
-    assert!(share > 0.75 && wrong < 1.5);
+    hold(share > 0.75 && wrong < 1.5, "areas");
 }
 
 /// Of exact gauges and touches that press straight the map is all that is off: a finer one finds them nearer.
@@ -484,7 +259,7 @@ fn a_finer_map_finds_touches_nearer() {
         median
     });
     let [draft, reference] = found;
-    assert!(reference < 0.35 && reference < 0.6 * draft, "{found:?}");
+    hold(reference < 0.35 && reference < 0.6 * draft, "0.35 mm");
 }
 
 /// Regressions that are trained on touches of the model find the place where they are asked for; how many touch, matching says
@@ -507,10 +282,16 @@ fn the_estimator_that_is_asked_for_finds_the_place() {
         [mean, by_matching]
     });
     let [matching, svr, normalized] = found;
-    assert!(matching[0] == matching[1] && matching[0] < 1.0, "{found:?}");
+    hold(
+        matching[0] == matching[1] && matching[0] < 1.0,
+        "1 mm by matching",
+    );
     for [mean, by_matching] in [svr, normalized] {
         assert!(by_matching == matching[1], "{found:?}");
-        assert!(mean > matching[0] && mean < 12.0, "{found:?}");
+        hold(
+            mean > matching[0] && mean < 12.0,
+            "matching before regressions",
+        );
     }
     assert!(svr[0] != normalized[0], "{found:?}");
 }
@@ -551,7 +332,10 @@ fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
         others.off(&heard)
     });
     println!("by hand: {before:.2} mm before, {off:.2} after, {held:.2} held");
-    assert!(off < 0.8 && off < 0.5 * before && held > 0.8);
+    hold(
+        off < 0.8 && off < 0.5 * before && held > 0.8,
+        "0.8 mm by hand",
+    );
     std::fs::remove_file(recording).unwrap();
 
     let mut presses = others.presses;
@@ -577,5 +361,8 @@ fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
     println!(
         "everything at once: {felt:.3} felt, {off:.2} mm off, {held:.2} held, {ghosts} ghosts"
     );
-    assert!(felt > 0.98 && off < 1.0 && held > 0.65 && ghosts == 0);
+    hold(
+        felt > 0.98 && off < 1.0 && held > 0.65 && ghosts == 0,
+        "1 mm with everything at once",
+    );
 }

@@ -1,6 +1,20 @@
-//! How the rest walks: each channel for itself, and all together at a speed. Learned while nothing touches.
+//! What the rest of all channels is since a tare, and how it walks: each channel for itself, and all together at a speed
+//! that changes, every one of them by a factor of its own.
+//!
+//! The state is (e, D, v, δ), 2 n + 2 numbers for n channels, and the rest b = e + (1 + δ) D. In a time Δ
+//!
+//! ```text
+//! e ← e + w                w ~ N(0, diag(q²) Δ)
+//! D ← D + v Δ + w'         w' ~ N(0, q_D² Δ)
+//! v ← v + w″               w″ ~ N(0, q_v² Δ)
+//! δ ← (1 - Δ/T) δ + w‴     w‴ ~ N(0, 2 u² Δ/T)
+//! ```
+//!
+//! How uneven channels are, u, is learned from all of them (empirical Bayes: the EM step of a variance, A. P. Dempster,
+//! N. M. Laird and D. B. Rubin, J. Royal Stat. Soc. B 39, 1977): where those that a touch does not hide drift alike, the
+//! others do so too.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::statistics::mean;
 
@@ -16,125 +30,212 @@ const HURRIES: f64 = 0.05e-6;
 /// Of a channel's noise, and of what all may have drifted by (strain): how well a tare knows the rest.
 const TARED: f64 = 0.3;
 const TARED_TOGETHER: f64 = 1e-6;
-/// Seconds of a tare, as far as they show a drift.
+/// Seconds of a tare, as far as they show a drift, and how well they show how far a channel has gone (strain).
 const TARED_S: f64 = 0.5;
+const SHOWN: f64 = 0.4e-6;
 /// Seconds at rest after which it is asked how far the rest has walked, and in which that is believed.
 const WINDOW_S: f64 = 0.25;
 const BELIEVED_S: f64 = 5.0;
-/// How far channels differ in what a temperature does to them (standard deviation, and at most), how well it is known where
-/// one has gone (strain), and how many windows are remembered.
+/// u before anything is known, what it is believed to be where all drift alike and for how many channels that belief
+/// counts, and the seconds in which channels change in that.
 const UNEVEN: f64 = 0.1;
-const DIFFERS: [f64; 2] = [0.2, 3.0];
-const SHOWN: f64 = 0.4e-6;
-const WINDOWS: f64 = 400.0;
+const ALIKE: f64 = 0.02;
+const BELIEF: f64 = 2.0;
+const CHANGES_S: f64 = 200.0;
 
-/// Steps of the rest in a second, and how steadily it drifts.
+/// The rest of every channel and what is known of its steps.
 pub(super) struct RestWalk {
+    /// (e, D, v, δ).
+    state: DVector<f64>,
+    /// Its covariance.
+    pub covariance: DMatrix<f64>,
     /// q² of each channel (strain² a second).
     own: Vec<f64>,
     least_own: Vec<f64>,
-    /// v, of the drift along the pattern (strain a second).
-    pub speed: f64,
-    /// s: what each channel drifts by where all drift by one, in the mean.
-    pub pattern: Vec<f64>,
-    /// What each channel has moved by at rest, and what all have in the mean (strain): where these are few, all move alike.
-    each: Vec<f64>,
-    all: f64,
-    /// How far all have drifted under a touch (strain): what is wrong with the pattern goes with that.
-    hidden: f64,
+    /// u².
+    uneven: f64,
     /// When the window began, and what the rest has been corrected by in it.
     pub rested_s: Option<f64>,
     walked: Vec<f64>,
+    /// Seconds since u was asked for.
+    asked_s: f64,
 }
 
 impl RestWalk {
     /// A channel of this noise (strain) at a rate (Hz) is followed within some seconds at rest, and drifts (strain a
     /// second) as it did while the tare was taken.
     pub fn new(noise: &[f64], drift: &[f64], follows_s: f64, rate: f64) -> Self {
-        let least = |n: &f64| (n / (follows_s * rate.sqrt())).max(OWN).powi(2);
+        let n = noise.len();
+        let least = |x: &f64| (x / (follows_s * rate.sqrt())).max(OWN).powi(2);
         let least_own: Vec<f64> = noise.iter().map(least).collect();
+        let mut variances = DVector::from_element(2 * n + 2, UNEVEN * UNEVEN);
+        for (c, x) in noise.iter().enumerate() {
+            variances[c] = (TARED * x).powi(2);
+        }
+        variances[n] = TARED_TOGETHER * TARED_TOGETHER;
+        variances[n + 1] = SPEED * SPEED;
         let mut walk = Self {
+            state: DVector::zeros(2 * n + 2),
+            covariance: DMatrix::from_diagonal(&variances),
             own: least_own.clone(),
             least_own,
-            speed: mean(drift),
-            pattern: vec![1.0; noise.len()],
-            each: vec![0.0; noise.len()],
-            all: 0.0,
-            hidden: 0.0,
+            uneven: UNEVEN * UNEVEN,
             rested_s: None,
-            walked: vec![0.0; noise.len()],
+            walked: vec![0.0; n],
+            asked_s: 0.0,
         };
-        if drift.len() == noise.len() {
-            let moved: Vec<f64> = drift.iter().map(|d| TARED_S * d).collect();
-            walk.learn_pattern(&moved);
+        if drift.len() == n {
+            walk.tared(drift);
         }
         walk
     }
 
-    /// What each channel drifts by where all drift by one, from how far they have moved (strain).
-    fn learn_pattern(&mut self, moved: &[f64]) {
-        let kept = 1.0 - WINDOWS.recip();
-        self.all = kept * self.all + mean(moved);
-        let prior = (SHOWN / UNEVEN).copysign(self.all);
-        for ((each, pattern), moved) in self.each.iter_mut().zip(&mut self.pattern).zip(moved) {
-            *each = kept * *each + moved;
-            *pattern = ((prior + *each) / (prior + self.all)).clamp(DIFFERS[0], DIFFERS[1]);
+    /// What a tare has shown of the drift (strain a second).
+    fn tared(&mut self, drift: &[f64]) {
+        let n = drift.len();
+        let speed = mean(drift);
+        self.state[n + 1] = speed;
+        // How uneven they are is known as well as it shows how far they have gone.
+        let shown = (SHOWN / (TARED_S * speed)).powi(2);
+        if !shown.is_finite() {
+            return;
+        }
+        for (c, d) in drift.iter().enumerate() {
+            let at = n + 2 + c;
+            let gain = self.covariance[(at, at)] / (self.covariance[(at, at)] + shown);
+            self.state[at] = gain * (d / speed - 1.0);
+            self.covariance[(at, at)] *= 1.0 - gain;
         }
     }
 
-    /// How far the pattern may be off.
-    fn doubt(&self) -> f64 {
-        SHOWN / (SHOWN / UNEVEN + self.all.abs())
+    fn channels(&self) -> usize {
+        self.own.len()
     }
 
-    /// P after a tare.
-    pub fn after_tare(noise: &[f64]) -> DMatrix<f64> {
-        let n = noise.len();
-        DMatrix::from_fn(n + 1, n + 1, |i, j| match (i, j) {
-            (i, j) if i == n && j == n => SPEED * SPEED,
-            (i, j) if i == n || j == n => 0.0,
-            (i, j) if i == j => (TARED * noise[i]).powi(2) + TARED_TOGETHER * TARED_TOGETHER,
-            _ => TARED_TOGETHER * TARED_TOGETHER,
+    /// 1 + δ of a channel.
+    fn factor(&self, channel: usize) -> f64 {
+        1.0 + self.state[self.channels() + 2 + channel]
+    }
+
+    /// b of every channel so many seconds later (strain).
+    pub fn rest(&self, seconds: f64) -> impl Iterator<Item = f64> + '_ {
+        let n = self.channels();
+        let together = self.state[n] + seconds * self.state[n + 1];
+        (0..n).map(move |c| self.state[c] + self.factor(c) * together)
+    }
+
+    /// What every channel drifts by now (strain a second).
+    pub fn speeds(&self) -> impl Iterator<Item = f64> + '_ {
+        let n = self.channels();
+        (0..n).map(move |c| self.factor(c) * self.state[n + 1])
+    }
+
+    /// Seconds go by, under a touch or none.
+    pub fn pass(&mut self, seconds: f64, hidden: bool) {
+        let n = self.channels();
+        self.covariance = self.later(seconds, hidden);
+        self.state[n] += seconds * self.state[n + 1];
+        let kept = 1.0 - (seconds / CHANGES_S).min(1.0);
+        for c in 0..n {
+            self.state[n + 2 + c] *= kept;
+        }
+        self.asked_s += seconds;
+        if self.asked_s >= WINDOW_S {
+            self.asked_s = 0.0;
+            self.learn_unevenness();
+        }
+    }
+
+    /// The state's covariance some seconds later.
+    fn later(&self, seconds: f64, hidden: bool) -> DMatrix<f64> {
+        let n = self.channels();
+        let mut p = self.covariance.clone();
+        // D by v: a row and then a column.
+        let speed = p.row(n + 1) * seconds;
+        let mut together = p.row_mut(n);
+        together += speed;
+        let speed = p.column(n + 1) * seconds;
+        let mut together = p.column_mut(n);
+        together += speed;
+        let changed = (seconds / CHANGES_S).min(1.0);
+        for c in n + 2..2 * n + 2 {
+            p.row_mut(c).scale_mut(1.0 - changed);
+            p.column_mut(c).scale_mut(1.0 - changed);
+            p[(c, c)] += changed * (2.0 - changed) * self.uneven;
+        }
+        let least = if hidden { HIDDEN * HIDDEN } else { 0.0 };
+        for (c, own) in self.own.iter().enumerate() {
+            p[(c, c)] += own.max(least) * seconds;
+        }
+        p[(n, n)] += TOGETHER * TOGETHER * seconds;
+        p[(n + 1, n + 1)] += HURRIES * HURRIES * seconds;
+        p
+    }
+
+    /// ∂b/∂state: channels × (2 n + 2).
+    fn jacobian(&self) -> DMatrix<f64> {
+        let n = self.channels();
+        DMatrix::from_fn(n, 2 * n + 2, |c, k| {
+            if k == c {
+                1.0
+            } else if k == n {
+                self.factor(c)
+            } else if k == n + 2 + c {
+                self.state[n]
+            } else {
+                0.0
+            }
         })
     }
 
-    /// How far a steady drift moves all in some seconds, in the mean (strain).
-    pub fn moves(&self, seconds: f64) -> f64 {
-        self.speed * seconds
+    /// The covariance of b so many seconds later (strain²).
+    pub fn rest_covariance(&self, seconds: f64, hidden: bool) -> DMatrix<f64> {
+        let by = self.jacobian();
+        &by * self.later(seconds, hidden) * by.transpose()
     }
 
-    /// P some seconds later, under a touch or none.
-    pub fn grow(&self, covariance: &mut DMatrix<f64>, seconds: f64, hidden: bool) {
-        let (n, s) = (self.own.len(), &self.pattern);
-        let of_speed = covariance[(n, n)];
-        let with_speed: Vec<f64> = (0..n).map(|i| covariance[(i, n)]).collect();
-        let together = TOGETHER * TOGETHER * seconds + of_speed * seconds * seconds;
-        let least = if hidden { HIDDEN * HIDDEN } else { 0.0 };
-        let after = self.hidden + self.moves(seconds).abs();
-        let uneven = self.doubt().powi(2) * (after * after - self.hidden * self.hidden);
-        for i in 0..n {
-            for j in 0..n {
-                let along = s[i] * with_speed[j] + s[j] * with_speed[i];
-                covariance[(i, j)] += together * s[i] * s[j] + along * seconds;
-            }
-            covariance[(i, i)] += self.own[i].max(least) * seconds + uneven;
-            let with = with_speed[i] + seconds * s[i] * of_speed;
-            (covariance[(i, n)], covariance[(n, i)]) = (with, with);
-        }
-        covariance[(n, n)] += HURRIES * HURRIES * seconds;
-    }
-
-    /// All have drifted (strain, in the mean) under a touch, or without one.
-    pub fn drifted(&mut self, along: f64, hidden: bool) {
-        self.hidden = if hidden {
-            self.hidden + along.abs()
-        } else {
-            0.0
+    /// Corrects the rest by what readings are off from it without a touch, with their variances (strain, strain²) and the
+    /// ways in which the touch may be another one. By how much b is another then (strain); nothing where the readings are
+    /// farther off than so many standard deviations of χ².
+    pub fn correct(
+        &mut self,
+        (off, most): (&[f64], f64),
+        variance: &[f64],
+        used: &[bool],
+        ways: &[Vec<f64>],
+    ) -> Option<Vec<f64>> {
+        let trusted: Vec<usize> = (0..off.len()).filter(|&k| used[k]).collect();
+        let of_trusted = |values: &[f64]| {
+            DVector::from_iterator(trusted.len(), trusted.iter().map(|&c| values[c]))
         };
+        let by = self.jacobian();
+        // What is read depends on the state, trusted × (2 n + 2).
+        let seen = by.select_rows(&trusted) * &self.covariance;
+        let mut inner = &seen * by.select_rows(&trusted).transpose();
+        inner += DMatrix::from_diagonal(&of_trusted(variance));
+        for way in ways {
+            let way = of_trusted(way);
+            inner.ger(1.0, &way, &way, 1.0);
+        }
+        let (factor, off) = (inner.cholesky()?, of_trusted(off));
+        let count = trusted.len() as f64;
+        if off.dot(&factor.solve(&off)) > count + most * (2.0 * count).sqrt() {
+            return None;
+        }
+        let gain = factor.solve(&seen);
+        let correction = gain.tr_mul(&off);
+        if correction.iter().any(|c| !c.is_finite()) {
+            return None;
+        }
+        self.covariance -= seen.tr_mul(&gain);
+        keep_a_covariance(&mut self.covariance);
+        let before: Vec<f64> = self.rest(0.0).collect();
+        self.state += correction;
+        Some(self.rest(0.0).zip(before).map(|(b, was)| b - was).collect())
     }
 
     /// Takes a correction at rest for what the rest walks by.
-    pub fn learn(&mut self, correction: &[f64], covariance: &DMatrix<f64>, now_s: f64) {
+    pub fn learn(&mut self, correction: &[f64], now_s: f64) {
         let Some(begun) = self.rested_s else {
             self.rested_s = Some(now_s);
             self.walked.fill(0.0);
@@ -145,30 +246,125 @@ impl RestWalk {
         }
         let window = now_s - begun;
         if window >= WINDOW_S {
-            self.believe(covariance, window);
+            self.believe(window);
             self.rested_s = Some(now_s);
             self.walked.fill(0.0);
         }
     }
 
-    fn believe(&mut self, covariance: &DMatrix<f64>, window: f64) {
-        let count = self.own.len().max(1) as f64;
-        let together = self.walked.iter().sum::<f64>() / count;
-        let share = |seconds: f64| (window / seconds).min(1.0);
-        for (c, walked) in self.walked.iter().enumerate() {
-            let alone = walked - together * self.pattern[c];
+    fn believe(&mut self, window: f64) {
+        let together = mean(&self.walked);
+        let covariance = self.rest_covariance(0.0, false);
+        let share = (window / BELIEVED_S).min(1.0);
+        for c in 0..self.channels() {
+            let alone = self.walked[c] - together * self.factor(c);
             let seen = (alone * alone - 2.0 * covariance[(c, c)]).max(0.0) / window;
-            self.own[c] += share(BELIEVED_S) * (seen.max(self.least_own[c]) - self.own[c]);
+            self.own[c] += share * (seen.max(self.least_own[c]) - self.own[c]);
         }
-        // The steady drift has been taken off before.
-        let steadily = self.speed * window;
-        let pairs = self.walked.iter().zip(&self.pattern);
-        let moved: Vec<f64> = pairs.map(|(walked, s)| walked + s * steadily).collect();
-        self.learn_pattern(&moved);
     }
 
-    /// What every channel drifts by now (strain a second).
-    pub fn drift(&self) -> impl Iterator<Item = f64> + '_ {
-        self.pattern.iter().map(|s| s * self.speed)
+    /// u² from what is known of δ. Where it is less than was thought, every δ is known better by as much: what a tighter
+    /// prior says beside the one before is a measurement of nothing, δ = 0 ± r.
+    fn learn_unevenness(&mut self) {
+        let n = self.channels();
+        let of = n + 2..2 * n + 2;
+        let squares = |k: usize| self.state[k].powi(2) + self.covariance[(k, k)];
+        let all: f64 = of.clone().map(squares).sum();
+        let uneven = (all + BELIEF * ALIKE * ALIKE) / (n as f64 + BELIEF);
+        let tighter = uneven.recip() - self.uneven.recip();
+        self.uneven = uneven;
+        if tighter <= 0.0 {
+            return;
+        }
+        for k in of {
+            let column = self.covariance.column(k).into_owned();
+            let gain = &column / (column[k] + tighter.recip());
+            self.state.axpy(-self.state[k], &gain, 1.0);
+            self.covariance.ger(-1.0, &gain, &column, 1.0);
+        }
+        keep_a_covariance(&mut self.covariance);
+    }
+}
+
+/// What rounding makes of it must stay a covariance.
+fn keep_a_covariance(p: &mut DMatrix<f64>) {
+    for i in 0..p.nrows() {
+        for j in 0..i {
+            let mean = f64::midpoint(p[(i, j)], p[(j, i)]);
+            (p[(i, j)], p[(j, i)]) = (mean, mean);
+        }
+        p[(i, i)] = p[(i, i)].max(1e-20);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 10;
+    const NOISE: f64 = 1e-6;
+    const STEP_S: f64 = 0.01;
+
+    /// A walk that has followed drifts (strain a second) for so many seconds, by blocks whose noise is small; the first
+    /// `hidden` channels are read for three seconds only.
+    fn followed(speeds: &[f64; N], seconds: f64, hidden: usize) -> RestWalk {
+        let mut walk = RestWalk::new(&[NOISE; N], &[], 3.0, 200.0);
+        let variance = [NOISE * NOISE / 2.0; N];
+        let mut used = [true; N];
+        for k in 1..=(seconds / STEP_S) as u32 {
+            let now = f64::from(k) * STEP_S;
+            if now > 3.0 {
+                used[..hidden].fill(false);
+            }
+            walk.pass(STEP_S, now > 3.0);
+            let wave = |c: usize| 0.7 * NOISE * (f64::from(k) * (1.3 + c as f64)).sin();
+            let read = (0..N).map(|c| speeds[c] * now + wave(c));
+            let off: Vec<f64> = read.zip(walk.rest(0.0)).map(|(x, b)| x - b).collect();
+            let corrected = walk.correct((&off, f64::INFINITY), &variance, &used, &[]);
+            assert!(corrected.is_some());
+        }
+        walk
+    }
+
+    /// Three channels that nobody reads for two minutes drift as the others are seen to; their uncertainty says so.
+    #[test]
+    fn what_is_hidden_drifts_as_the_others_do() {
+        let walk = followed(&[2e-6; N], 120.0, 3);
+        let covariance = walk.rest_covariance(0.0, true);
+        for (c, rest) in walk.rest(0.0).take(3).enumerate() {
+            let off = (rest - 240e-6).abs();
+            let deviation = covariance[(c, c)].sqrt();
+            assert!(
+                deviation < 4e-6 && off < 2.0 * deviation,
+                "{c}: {off} of {deviation}"
+            );
+        }
+    }
+
+    #[test]
+    fn channels_that_drift_unevenly_are_told() {
+        let speeds: [f64; N] = std::array::from_fn(|c| if c % 2 == 0 { 2.4e-6 } else { 1.6e-6 });
+        let walk = followed(&speeds, 20.0, 0);
+        let mean = mean(&speeds);
+        for (speed, found) in speeds.iter().zip(walk.speeds()) {
+            assert!((found - speed).abs() < 0.05 * mean, "{found}");
+        }
+        assert!(walk.uneven.sqrt() > 0.1, "{}", walk.uneven.sqrt());
+        let even = followed(&[2e-6; N], 20.0, 0);
+        assert!(even.uneven.sqrt() < 0.03, "{}", even.uneven.sqrt());
+    }
+
+    #[test]
+    fn what_comes_at_once_is_no_drift() {
+        let mut walk = followed(&[0.0; N], 5.0, 0);
+        let before: Vec<f64> = walk.rest(0.0).collect();
+        let mut jump = [0.0; N];
+        jump[3] = 40e-6;
+        let refused = walk.correct((&jump, 8.0), &[NOISE * NOISE; N], &[true; N], &[]);
+        assert!(refused.is_none() && walk.rest(0.0).eq(before));
+        // Where it is a way in which the touch may be another one, it says nothing of the rest.
+        let ways = [vec![0.0; N], jump.map(|x| 10.0 * x).to_vec()];
+        let taken = walk.correct((&jump, 8.0), &[NOISE * NOISE; N], &[true; N], &ways);
+        assert!(taken.is_some_and(|by| by.iter().all(|b| b.abs() < 0.5e-6)));
     }
 }
