@@ -9,6 +9,9 @@ use crate::mesh::SurfacePoint;
 
 /// Radii of areas (m). What is smaller is a point: a finger's tip.
 pub(super) const RADII: [f64; 2] = [8e-3, 36e-3];
+/// How unevenly an area presses, over its pressure in the mean (standard deviation, each of the ways of
+/// [`uneven_over`]): no palm is a ball.
+const UNEVEN: f64 = 0.3;
 /// How far an area is moved (m) and widened to see how its readings change: as far as its edge takes to pass templates.
 const MOVED: f64 = 1e-3;
 const WIDENED: f64 = 0.08;
@@ -102,11 +105,16 @@ impl Matching {
         }
     }
 
-    /// What a spot may have about it. Of an area its size is searched for.
+    /// What a spot may have about it. Of an area its size is searched for, and how it presses is known by and large.
     pub(super) fn nuisances_of(&self, spot: &Spot) -> Vec<Nuisance> {
         let mut all = self.nuisances().map_or_else(Vec::new, |n| n.at(spot.at));
-        if spot.radius.is_some() {
+        if let Some(radius) = spot.radius {
             all.retain(|n| n.tip == 0.0);
+            all.extend(uneven_over(&self.map, spot.at, radius).map(|reading| Nuisance {
+                force: DVec3::ZERO,
+                tip: 0.0,
+                reading,
+            }));
         }
         all
     }
@@ -126,16 +134,9 @@ pub(super) fn pressed_over(
     (centre, normal): (DVec3, DVec3),
     radius: f64,
 ) -> Vec<f64> {
-    let normals = map.mesh.vertex_normals();
     let mut sum = vec![0.0; map.channels()];
     let mut force = 0.0;
-    for &node in nodes {
-        let inside = 1.0 - map.places[node].distance_squared(centre) / (radius * radius);
-        let facing = normals[node].dot(normal);
-        if inside <= 0.0 || facing <= 0.0 {
-            continue;
-        }
-        let pressure = map.areas[node] * inside.sqrt();
+    for (node, pressure, facing) in pressures(map, nodes, (centre, normal), radius) {
         force += pressure * facing;
         for (s, g) in sum.iter_mut().zip(map.node(node)) {
             *s += pressure * g;
@@ -147,4 +148,57 @@ pub(super) fn pressed_over(
         }
     }
     sum
+}
+
+/// Every node of some that an area presses on, with its share of the pressure and how far it faces the centre's way.
+fn pressures<'a>(
+    map: &'a ResponseMap,
+    nodes: &'a [usize],
+    (centre, normal): (DVec3, DVec3),
+    radius: f64,
+) -> impl Iterator<Item = (usize, f64, f64)> + 'a {
+    let normals = map.mesh.vertex_normals();
+    nodes.iter().filter_map(move |&node| {
+        let inside = 1.0 - map.places[node].distance_squared(centre) / (radius * radius);
+        let facing = normals[node].dot(normal);
+        (inside > 0.0 && facing > 0.0).then(|| (node, map.areas[node] * inside.sqrt(), facing))
+    })
+}
+
+/// What is read of a newton more of the ways in which an area may press unevenly, as far as is usual: more on one side, more
+/// on two sides that face each other, more in the middle, each with as little on the rest of it.
+fn uneven_over(
+    map: &ResponseMap,
+    at: SurfacePoint,
+    radius: f64,
+) -> impl Iterator<Item = Vec<f64>> + use<> {
+    let (centre, normal) = (map.mesh.point(at), map.mesh.normal(at));
+    let first = normal.any_orthonormal_vector();
+    let second = normal.cross(first);
+    let nodes = nodes_near(map, centre, radius);
+    let mut readings: [Vec<f64>; 5] = std::array::from_fn(|_| vec![0.0; map.channels()]);
+    let (mut even, mut force, mut forces) = (vec![0.0; map.channels()], 0.0, [0.0; 5]);
+    for (node, pressure, facing) in pressures(map, &nodes, (centre, normal), radius) {
+        let off = (map.places[node] - centre) / radius;
+        let (x, y, r2) = (off.dot(first), off.dot(second), off.length_squared());
+        let ways = [x, y, x * x - y * y, 2.0 * x * y, 2.0 * r2 - 1.0];
+        force += pressure * facing;
+        for (channel, g) in map.node(node).iter().enumerate() {
+            even[channel] += pressure * g;
+            for (reading, way) in readings.iter_mut().zip(ways) {
+                reading[channel] += way * pressure * g;
+            }
+        }
+        for (sum, way) in forces.iter_mut().zip(ways) {
+            *sum += way * pressure * facing;
+        }
+    }
+    // The force stays what it is.
+    let force = f64::max(force, f64::MIN_POSITIVE);
+    for (reading, of_way) in readings.iter_mut().zip(forces) {
+        for (r, e) in reading.iter_mut().zip(&even) {
+            *r = UNEVEN * (*r - of_way / force * e) / force;
+        }
+    }
+    readings.into_iter()
 }
