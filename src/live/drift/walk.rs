@@ -7,14 +7,13 @@
 //! e ← e + w                w ~ N(0, diag(q²) Δ)
 //! D ← D + v Δ + w'         w' ~ N(0, q_D² Δ)
 //! v ← v + w″               w″ ~ N(0, q_v² Δ)
-//! δ ← (1 - Δ/T) δ + w‴     w‴ ~ N(0, 2 u² Δ/T)
+//! δ ← δ + w‴               w‴ ~ N(0, u² Δ/T), of which a touch says nothing
 //! ```
 //!
-//! How uneven channels are, u, is learned from all of them (empirical Bayes: the EM step of a variance, A. P. Dempster,
-//! N. M. Laird and D. B. Rubin, J. Royal Stat. Soc. B 39, 1977): where those that a touch does not hide drift alike, the
-//! others do so too.
+//! How uneven channels are, u, is learned from what is known of all of them (empirical Bayes: C. N. Morris, J. American Stat.
+//! Association 78, 1983): where those that a touch does not hide drift alike, the others do so too.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::statistics::mean;
 
@@ -37,11 +36,14 @@ const SHOWN: f64 = 0.4e-6;
 const WINDOW_S: f64 = 0.25;
 const BELIEVED_S: f64 = 5.0;
 /// u before anything is known, what it is believed to be where all drift alike and for how many channels that belief
-/// counts, and the seconds in which channels change in that.
+/// counts, and the seconds at rest in which channels change in that.
 const UNEVEN: f64 = 0.1;
 const ALIKE: f64 = 0.02;
 const BELIEF: f64 = 2.0;
 const CHANGES_S: f64 = 200.0;
+/// A direction of δ is told of where its variance is less than this share of u², and u is learned from so many at least.
+const TOLD: f64 = 0.25;
+const FEWEST: f64 = 4.0;
 
 /// The rest of every channel and what is known of its steps.
 pub(super) struct RestWalk {
@@ -135,10 +137,6 @@ impl RestWalk {
         let n = self.channels();
         self.covariance = self.later(seconds, hidden);
         self.state[n] += seconds * self.state[n + 1];
-        let kept = 1.0 - (seconds / CHANGES_S).min(1.0);
-        for c in 0..n {
-            self.state[n + 2 + c] *= kept;
-        }
         self.asked_s += seconds;
         if self.asked_s >= WINDOW_S {
             self.asked_s = 0.0;
@@ -157,11 +155,9 @@ impl RestWalk {
         let speed = p.column(n + 1) * seconds;
         let mut together = p.column_mut(n);
         together += speed;
-        let changed = (seconds / CHANGES_S).min(1.0);
+        let changed = if hidden { 0.0 } else { seconds / CHANGES_S };
         for c in n + 2..2 * n + 2 {
-            p.row_mut(c).scale_mut(1.0 - changed);
-            p.column_mut(c).scale_mut(1.0 - changed);
-            p[(c, c)] += changed * (2.0 - changed) * self.uneven;
+            p[(c, c)] += changed * self.uneven;
         }
         let least = if hidden { HIDDEN * HIDDEN } else { 0.0 };
         for (c, own) in self.own.iter().enumerate() {
@@ -263,20 +259,29 @@ impl RestWalk {
         }
     }
 
-    /// u² from what is known of δ. Where it is less than was thought, every δ is known better by as much: what a tighter
-    /// prior says beside the one before is a measurement of nothing, δ = 0 ± r.
+    /// u² from what is known of δ: from those directions of it that readings have told of, as many as they are. Where it is
+    /// less than was thought, every δ is known better by as much: what a tighter prior says beside the one before is a
+    /// measurement of nothing, δ = 0 ± r.
     fn learn_unevenness(&mut self) {
         let n = self.channels();
-        let of = n + 2..2 * n + 2;
-        let squares = |k: usize| self.state[k].powi(2) + self.covariance[(k, k)];
-        let all: f64 = of.clone().map(squares).sum();
-        let uneven = (all + BELIEF * ALIKE * ALIKE) / (n as f64 + BELIEF);
+        let known = self.covariance.view((n + 2, n + 2), (n, n));
+        let known = SymmetricEigen::new(known.into_owned());
+        let along = known.eigenvectors.tr_mul(&self.state.rows(n + 2, n));
+        let pairs = known.eigenvalues.iter().zip(along.iter());
+        let told = pairs.filter(|(variance, _)| **variance < TOLD * self.uneven);
+        let (count, squares) = told.fold((0.0, 0.0), |(count, sum), (variance, along)| {
+            (count + 1.0, sum + along * along + variance)
+        });
+        if count < FEWEST {
+            return;
+        }
+        let uneven = (squares + BELIEF * ALIKE * ALIKE) / (count + BELIEF);
         let tighter = uneven.recip() - self.uneven.recip();
         self.uneven = uneven;
         if tighter <= 0.0 {
             return;
         }
-        for k in of {
+        for k in n + 2..2 * n + 2 {
             let column = self.covariance.column(k).into_owned();
             let gain = &column / (column[k] + tighter.recip());
             self.state.axpy(-self.state[k], &gain, 1.0);
