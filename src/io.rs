@@ -9,6 +9,7 @@ pub mod fingerprint;
 pub mod glb;
 pub mod handover;
 pub mod kept_model;
+pub mod kept_simulation;
 pub mod machine_file;
 pub mod mesh_file;
 pub mod npy;

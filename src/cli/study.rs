@@ -2,6 +2,7 @@
 
 mod collect;
 mod run;
+mod shared;
 mod submit;
 mod unit;
 

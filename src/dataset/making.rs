@@ -83,6 +83,23 @@ impl MakingSlopes {
         Ok((found, solves))
     }
 
+    /// Of all sites, sites × touches each or nothing: by the tip's radius, and along two directions.
+    #[must_use]
+    pub fn all(&self) -> [&[f32]; 3] {
+        let [along, across] = &self.shear;
+        [&self.tip, along, across]
+    }
+
+    /// Slopes that are known already, as [`Self::all`] has them.
+    #[must_use]
+    pub fn known(touches: Vec<usize>, [tip, along, across]: [Vec<f32>; 3]) -> Self {
+        Self {
+            columns: Columns::new(touches),
+            tip,
+            shear: [along, across],
+        }
+    }
+
     /// The touches of the dataset that they are known for.
     #[must_use]
     pub fn columns(&self) -> &Columns {

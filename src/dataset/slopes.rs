@@ -110,9 +110,15 @@ impl GluingSlopes {
         }
     }
 
+    /// Of all sites: along, across and turned, sites × touches each.
+    #[must_use]
+    pub fn all(&self) -> [&[f32]; 3] {
+        [&self.along, &self.across, &self.turned]
+    }
+
     /// Slopes that are known already: along, across and turned.
-    #[cfg(test)]
-    pub(super) fn known(touches: Vec<usize>, [along, across, turned]: [Vec<f32>; 3]) -> Self {
+    #[must_use]
+    pub fn known(touches: Vec<usize>, [along, across, turned]: [Vec<f32>; 3]) -> Self {
         Self {
             columns: Columns::new(touches),
             along,

@@ -56,6 +56,8 @@ pub struct Simulated {
     pub linearity: Option<Linearity>,
     /// What the solution was checked for.
     pub checks: Checks,
+    /// Whether memory did not hold as many elements as were asked for.
+    pub is_short: bool,
     /// What was reached, and at what effort.
     pub achieved: Achieved,
 }
@@ -159,6 +161,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         estimate,
         linearity,
         checks,
+        is_short,
     };
     // The last model is counted with the dataset.
     let before = Work {
@@ -167,11 +170,9 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         solves,
         ..Work::default()
     };
-    let mut simulated = read(
+    read(
         inputs, budget, known, &*model, touches, &places, before, watch,
-    )?;
-    (simulated.achieved.cautions).extend(short_of_memory(is_short));
-    Ok(simulated)
+    )
 }
 
 /// Refuses gauges that are required farther from the part than it is large.
@@ -226,6 +227,7 @@ pub fn simulate_again(
         estimate: last.discretization,
         linearity: last.linearity,
         checks: last.checks,
+        is_short: last.is_short,
     };
     let model = last.meshed.model(watch)?;
     let touches = last.dataset.touches.clone();
@@ -236,11 +238,13 @@ pub fn simulate_again(
 }
 
 /// Elements with what is known of them.
-struct JudgedElements {
-    meshed: Meshed,
-    estimate: Discretization,
-    linearity: Option<Linearity>,
-    checks: Checks,
+pub(super) struct JudgedElements {
+    pub meshed: Meshed,
+    pub estimate: Discretization,
+    pub linearity: Option<Linearity>,
+    pub checks: Checks,
+    /// Whether memory did not hold as many as were asked for.
+    pub is_short: bool,
 }
 
 /// What sites at some places (m) report of touches on a model, with everything that its reader must know.
@@ -258,12 +262,6 @@ fn read(
     before: Work,
     watch: Watch,
 ) -> Result<Simulated, DesignError> {
-    let JudgedElements {
-        meshed,
-        estimate,
-        linearity,
-        checks,
-    } = known;
     let project = &inputs.project;
     let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index().nearest(p).0).collect();
     let unknowns = model.system().dimension();
@@ -274,6 +272,26 @@ fn read(
     let mut dataset =
         dataset::simulate(model, touches, &points, signal, directions, changes, watch)?;
     dataset.work += before;
+    finish(inputs, budget, known, (dataset, unknowns), places, watch)
+}
+
+/// A simulation of what was read on elements of so many unknowns, with everything that its reader must know.
+pub(super) fn finish(
+    inputs: &Inputs,
+    budget: &Budget,
+    known: JudgedElements,
+    (dataset, unknowns): (Dataset, usize),
+    places: &[DVec3],
+    watch: Watch,
+) -> Result<Simulated, DesignError> {
+    let JudgedElements {
+        meshed,
+        estimate,
+        linearity,
+        checks,
+        is_short,
+    } = known;
+    let project = &inputs.project;
     let mut notes = if dataset.touches.len() < project.touch.count {
         vec![format!(
             "{} touches instead of the project's {}: the budget of this quality.",
@@ -292,6 +310,7 @@ fn read(
     cautious.extend(overlapping_tetrahedra(inputs));
     cautious.extend(required_off(inputs));
     cautious.extend(on_supports(inputs, &dataset.touches)?);
+    cautious.extend(short_of_memory(is_short));
     let (mesh, held) = meshed.gauge_surface();
     let index = mesh.index();
     let points: Vec<SurfacePoint> = places.iter().map(|&p| index.nearest(p).0).collect();
@@ -330,6 +349,7 @@ fn read(
         unknowns,
         linearity,
         checks,
+        is_short,
     })
 }
 

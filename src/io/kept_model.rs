@@ -89,7 +89,7 @@ fn key(inputs: &Inputs, budget: &Budget) -> String {
 }
 
 /// Size and time of the program's file.
-fn program() -> String {
+pub(super) fn program() -> String {
     let of = std::env::current_exe().and_then(std::fs::metadata);
     of.map(|of| format!("{} {:?}", of.len(), of.modified().ok()))
         .unwrap_or_default()

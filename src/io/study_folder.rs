@@ -7,6 +7,7 @@
 //! | `units.csv` | the values of every unit |
 //! | `results/000017.json` | what unit 17 found: the same bytes whoever computes it |
 //! | `costs/000017.json` | what that took |
+//! | `shared/KEY.npz` | a simulation that several units need, while one of them is missing ([`super::kept_simulation`]) |
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -81,6 +82,7 @@ const PLAN: &str = "plan.json";
 const UNITS: &str = "units.csv";
 const RESULTS: &str = "results";
 const COSTS: &str = "costs";
+const SHARED: &str = "shared";
 
 /// A study from its file.
 ///
@@ -205,6 +207,18 @@ impl StudyFolder {
 
     fn result_path(&self, unit: usize) -> PathBuf {
         self.folder.join(RESULTS).join(format!("{unit:06}.json"))
+    }
+
+    /// Where simulations lie that several units need.
+    #[must_use]
+    pub fn shared(&self) -> PathBuf {
+        self.folder.join(SHARED)
+    }
+
+    /// Whether anything was written of a unit.
+    #[must_use]
+    pub fn is_done(&self, unit: usize) -> bool {
+        self.result_path(unit).exists()
     }
 
     /// Writes what came of a unit, and what that took.

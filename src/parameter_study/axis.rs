@@ -102,7 +102,8 @@ impl StudyAxis {
     }
 
     /// The value at a share of the whole axis, from 0 to 1.
-    pub(super) fn at(&self, share: f64) -> Value {
+    #[must_use]
+    pub fn at(&self, share: f64) -> Value {
         match &self.values {
             Some(values) => {
                 let k = (share * values.len() as f64) as usize;

@@ -154,6 +154,52 @@ fn units_have_the_same_bytes_whoever_computes_them() {
     assert!(!front[2] && !front[5], "{front:?}");
 }
 
+/// Each unit by a process of its own: the first leaves its simulation for the others, the last takes it away; a damaged one
+/// costs nothing but time.
+#[test]
+fn processes_share_a_simulation() {
+    let text = STUDY
+        .replace("values = [1.5, 2.0]", "values = [1.5]")
+        .replace("[3, 4, 0]", "[3, 4, 5]");
+    let study = Study::new(&text);
+    let kept = |folder: &str| -> Vec<PathBuf> {
+        let listed = fs::read_dir(study.path(folder).join("shared"));
+        listed.map_or(Vec::new(), |all| {
+            all.map(|one| one.unwrap().path()).collect()
+        })
+    };
+    let shared = |folder: &str, unit: usize| -> bool {
+        let path = study.path(folder).join(format!("costs/{unit:06}.json"));
+        let cost: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        cost["shared"].as_bool().unwrap()
+    };
+    for (name, damage) in [("whole", false), ("damaged", true)] {
+        study.plan(name);
+        let run = |unit: &str| done(&["study", "run", &study.text(name), "--unit", unit]);
+        run("2");
+        let [one] = &kept(name)[..] else {
+            panic!("{:?}", kept(name));
+        };
+        if damage {
+            let bytes = fs::read(one).unwrap();
+            fs::write(one, &bytes[..bytes.len() / 2]).unwrap();
+        }
+        run("0");
+        assert_eq!(kept(name).len(), 1);
+        run("1");
+        assert!(kept(name).is_empty());
+        let found = [2, 0, 1].map(|unit| shared(name, unit));
+        assert_eq!(found, [false, !damage, true], "{name}");
+        done(&["study", "collect", &study.text(name)]);
+    }
+    study.plan("together");
+    done(&["study", "run", &study.text("together"), "--local"]);
+    assert!(kept("together").is_empty());
+    done(&["study", "collect", &study.text("together")]);
+    let read = |folder: &str| fs::read(study.path(folder).join("results.csv")).unwrap();
+    assert!(read("whole") == read("together") && read("damaged") == read("together"));
+}
+
 #[test]
 fn what_a_unit_finds_is_what_a_design_finds() {
     let one = STUDY

@@ -217,6 +217,7 @@ impl<'a> Crew<'a> {
                     found => found.with_context(|| format!("unit {unit}"))?,
                 };
                 self.folder.write(&outcome, &cost)?;
+                bench.tidy(self.folder);
                 self.tell(&cost, outcome.error.as_deref(), begun);
             }
         }

@@ -1,41 +1,23 @@
 //! One unit of a study: its project, its design, and what is said of it.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::Map;
 
+use super::shared::{SharedSimulations, SimulationKey};
 use crate::budget::Watch;
-use crate::design::{self, DesignError, Simulated};
-use crate::document::{Document, SimulationInputs};
+use crate::design::{self, DesignError};
 use crate::io::cpu_seconds;
 use crate::io::project_file::LoadedProject;
 use crate::io::study_folder::{StudyFolder, UnitCost, UnitOutcome, plain};
-use crate::mesh::TriMesh;
 use crate::parameter_study::{Figure, ParameterStudy, Points, figures};
 use crate::varied::UnitBase;
 
-/// What units are made on: the base, and the last simulation, which the next unit may share.
+/// What units are made on: the base, and simulations that several of them need.
 pub struct Workbench {
     pub base: UnitBase,
-    last: Option<MadeSimulation>,
-}
-
-/// A simulation with what it was made from.
-struct MadeSimulation {
-    inputs: SimulationInputs,
-    part: Arc<TriMesh>,
-    simulated: Arc<Simulated>,
-}
-
-impl MadeSimulation {
-    /// Whether it is of these inputs on this part: of another part the inputs say nothing.
-    fn is_of(&self, inputs: &SimulationInputs, part: &TriMesh) -> bool {
-        self.inputs == *inputs
-            && self.part.positions() == part.positions()
-            && self.part.triangles() == part.triangles()
-    }
+    shared: SharedSimulations,
 }
 
 impl Workbench {
@@ -46,7 +28,7 @@ impl Workbench {
     pub fn new(study: &ParameterStudy, home: &Path) -> anyhow::Result<Self> {
         Ok(Self {
             base: UnitBase::new(study, home)?,
-            last: None,
+            shared: SharedSimulations::default(),
         })
     }
 
@@ -82,7 +64,7 @@ impl Workbench {
         match self.base.project(study, &values) {
             Err(error) if self.base.is_gone() => return Err(error),
             Err(error) => outcome.error = Some(self.base.without_home(&format!("{error:#}"))),
-            Ok(loaded) => match self.designed(loaded, study, watch, &mut shared) {
+            Ok(loaded) => match self.designed(loaded, (folder, points, unit), watch, &mut shared) {
                 Ok((figures, cautions)) => {
                     (outcome.figures, outcome.cautions) = (figures, cautions);
                 }
@@ -99,35 +81,30 @@ impl Workbench {
         Ok((outcome, cost))
     }
 
+    /// A unit was written: what nobody needs any more is taken away.
+    pub fn tidy(&self, folder: &StudyFolder) {
+        self.shared.tidy(folder);
+    }
+
     /// The figures of a project's design and its cautions.
     fn designed(
         &mut self,
         loaded: LoadedProject,
-        study: &ParameterStudy,
+        unit: (&StudyFolder, &Points, usize),
         watch: Watch,
         shared: &mut bool,
     ) -> Result<(Vec<Figure>, Vec<String>), DesignError> {
         loaded.inputs.project.check()?;
         let inputs = loaded.inputs.clone();
         let budget = inputs.project.budget.budget();
-        let part = Arc::clone(&inputs.part);
-        let key = Document::new(loaded, None).simulation_inputs(inputs.project.budget.quality);
-        let known = self.last.take().filter(|made| made.is_of(&key, &part));
-        *shared = known.is_some();
-        let simulated = match known {
-            Some(made) => made.simulated,
-            None => Arc::new(design::simulate(&inputs, &budget, watch)?),
-        };
-        self.last = Some(MadeSimulation {
-            inputs: key,
-            part,
-            simulated: Arc::clone(&simulated),
-        });
+        let made_from = (&inputs, SimulationKey::of(loaded));
+        let simulated = (self.shared).simulated(unit, &self.base, made_from, watch)?;
+        *shared = simulated.1;
         let kinds = inputs.project.selectors();
         let begun = Instant::now();
         let clock = || begun.elapsed().as_secs_f64();
-        let design = design::run_from(&inputs, simulated, &kinds, &budget, &clock, watch)?;
-        let found = figures(&inputs, &design, study.base.density_g_cm3)?;
+        let design = design::run_from(&inputs, simulated.0, &kinds, &budget, &clock, watch)?;
+        let found = figures(&inputs, &design, unit.0.study.base.density_g_cm3)?;
         Ok((found, design.cautions()))
     }
 }

@@ -110,11 +110,13 @@ impl Matching {
         let mut all = self.nuisances().map_or_else(Vec::new, |n| n.at(spot.at));
         if let Some(radius) = spot.radius {
             all.retain(|n| n.tip == 0.0);
-            all.extend(uneven_over(&self.map, spot.at, radius).map(|reading| Nuisance {
-                force: DVec3::ZERO,
-                tip: 0.0,
-                reading,
-            }));
+            all.extend(
+                uneven_over(&self.map, spot.at, radius).map(|reading| Nuisance {
+                    force: DVec3::ZERO,
+                    tip: 0.0,
+                    reading,
+                }),
+            );
         }
         all
     }
