@@ -176,7 +176,10 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
 }
 
 /// Refuses gauges that are required farther from the part than it is large.
-fn check_required(inputs: &Inputs) -> Result<(), DesignError> {
+///
+/// # Errors
+/// [`DesignError::Value`] naming the key.
+pub fn check_required(inputs: &Inputs) -> Result<(), DesignError> {
     let what = "place of selection.required_mm";
     check_reach(&inputs.part, what, inputs.project.selection.required())
 }

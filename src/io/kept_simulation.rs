@@ -1,5 +1,5 @@
-//! A simulation in a file, for whoever needs one of the same inputs: the units of a study that differ in nothing that a
-//! simulation hangs on compute it once, whichever process or machine they run on.
+//! A simulation in a file, for whoever needs one of the same inputs: units of a study that differ in nothing that a simulation
+//! knows of read it, whichever process or machine they run on. Nobody waits for anybody: those that begin at once compute it each.
 //!
 //! The file is named by what it was computed from, is written by an atomic rename, and may be deleted whenever one likes.
 //! What cannot be read is computed anew.
@@ -31,9 +31,14 @@ use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::gauge::Gauge;
+use crate::memory;
 use crate::mesh::remesh::Remeshed;
 use crate::mesh::{SurfacePoint, TriMesh};
 
+/// Bytes that are held for a number while it is written, of the array and of the file; and the share of the memory that they
+/// may take.
+const BYTES_WRITTEN: f64 = 16.0;
+const SHARE: f64 = 0.25;
 /// Numbers of a touch, of a site and of a place.
 const OF_A_TOUCH: usize = 8;
 const OF_A_SITE: usize = 11;
@@ -63,13 +68,15 @@ pub fn key(inputs: &str, part: &TriMesh) -> String {
     key.hex()
 }
 
-/// Writes a simulation, where it is one that memory has not cut short and whose gauges all lie on its lattice: whether it
-/// was.
+/// Writes a simulation, where it is one that memory has not cut short, nor would, and whose gauges all lie on its lattice:
+/// whether it was.
 ///
 /// # Errors
 /// [`FileError`] where it cannot be written.
 pub fn write(path: &Path, of: &Simulated) -> Result<bool, FileError> {
-    if of.is_short || of.lattice != of.dataset.sites.len() {
+    let bytes = BYTES_WRITTEN * of.dataset.x.values().len() as f64;
+    let is_large = bytes > SHARE * memory::allowed();
+    if of.is_short || is_large || of.lattice != of.dataset.sites.len() {
         return Ok(false);
     }
     let build = || -> std::io::Result<NpzFile> {

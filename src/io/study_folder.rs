@@ -215,6 +215,15 @@ impl StudyFolder {
         self.folder.join(SHARED)
     }
 
+    /// Takes away what lies there, where no unit is missing any more.
+    pub fn tidy_shared(&self) {
+        let shared = self.shared();
+        if shared.is_dir() && (0..self.plan.units).rev().all(|unit| self.is_done(unit)) {
+            // Whatever stays costs room and nothing else.
+            let _ = std::fs::remove_dir_all(shared);
+        }
+    }
+
     /// Whether anything was written of a unit.
     #[must_use]
     pub fn is_done(&self, unit: usize) -> bool {

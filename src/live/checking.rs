@@ -167,7 +167,8 @@ impl Checking {
                 continue;
             }
             let all = matching.errors.noise[k];
-            let rest = (all * all - noise[k] * noise[k]).max(0.0).sqrt();
+            let own = (all * all - noise[k] * noise[k]).max(0.0).sqrt();
+            let rest = own.hypot(matching.errors.drift);
             // Only one that says nothing, or was found dead, is worth asking the others about.
             if used[k] && mean.is_felt(k, rms, [noise[k], rest]) {
                 self.watchers[k].felt();

@@ -175,6 +175,7 @@ impl Drift {
             let variance: Vec<f64> = noise.iter().map(|n| n * n / block.samples).collect();
             let off = (&off[..], f64::INFINITY);
             if let Some(correction) = self.walk.correct(off, &variance, used, &[]) {
+                self.walk.settle();
                 self.walk.learn(&correction, self.as_of_s);
             }
         }

@@ -292,6 +292,9 @@ impl Pipeline {
         if self.last.is_some() && contact.is_some() {
             let read = (&strain[..], &self.ground.noise[..]);
             (self.checking).look(&mut self.matching, sample.time_us, read);
+        } else {
+            // What gauges read of several touches says nothing of one.
+            self.checking.end_touch();
         }
         self.follow(
             [&raw, &strain],

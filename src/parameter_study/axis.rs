@@ -102,8 +102,7 @@ impl StudyAxis {
     }
 
     /// The value at a share of the whole axis, from 0 to 1.
-    #[must_use]
-    pub fn at(&self, share: f64) -> Value {
+    pub(super) fn at(&self, share: f64) -> Value {
         match &self.values {
             Some(values) => {
                 let k = (share * values.len() as f64) as usize;

@@ -93,7 +93,10 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
             plain::either(there, "unit is", "units are")
         ));
     }
-    Crew::new(args, &folder, wanted).work()
+    Crew::new(args, &folder, wanted).work()?;
+    // What a unit that failed, or was killed, has left behind.
+    folder.tidy_shared();
+    Ok(())
 }
 
 /// That the meshes of these units are those that the study was planned with.

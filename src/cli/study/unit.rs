@@ -82,7 +82,7 @@ impl Workbench {
     }
 
     /// A unit was written: what nobody needs any more is taken away.
-    pub fn tidy(&self, folder: &StudyFolder) {
+    pub fn tidy(&mut self, folder: &StudyFolder) {
         self.shared.tidy(folder);
     }
 
@@ -98,7 +98,8 @@ impl Workbench {
         let inputs = loaded.inputs.clone();
         let budget = inputs.project.budget.budget();
         let made_from = (&inputs, SimulationKey::of(loaded));
-        let simulated = (self.shared).simulated(unit, &self.base, made_from, watch)?;
+        design::check_required(&inputs)?;
+        let simulated = (self.shared).simulated(unit, made_from, watch)?;
         *shared = simulated.1;
         let kinds = inputs.project.selectors();
         let begun = Instant::now();

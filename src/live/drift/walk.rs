@@ -10,12 +10,18 @@
 //! δ ← δ + w‴               w‴ ~ N(0, u² Δ/T), of which a touch says nothing
 //! ```
 //!
+//! D is how far all have drifted since the last correction at rest: what lies before is in e. The mean of δ is nothing:
+//! half as large a D with factors twice as large would be the same.
+//!
 //! How uneven channels are, u, is learned from what is known of all of them (empirical Bayes: C. N. Morris, J. American Stat.
 //! Association 78, 1983): where those that a touch does not hide drift alike, the others do so too.
 
+#[cfg(test)]
+mod tests;
+
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::statistics::mean;
+use crate::statistics::{mean, median};
 
 /// What a channel walks by in a second at least, and what all do together beside their speed (strain): a workshop is never
 /// quite still.
@@ -41,20 +47,28 @@ const UNEVEN: f64 = 0.1;
 const ALIKE: f64 = 0.02;
 const BELIEF: f64 = 2.0;
 const CHANGES_S: f64 = 200.0;
-/// A direction of δ is told of where its variance is less than this share of u², and u is learned from so many at least.
-const TOLD: f64 = 0.25;
+/// u is learned from half of the directions of δ at least, and from so many; between these values, of which so many are tried.
 const FEWEST: f64 = 4.0;
+const LEAST_UNEVEN: f64 = 0.005;
+const MOST_UNEVEN: f64 = 0.8;
+const TRIED: u32 = 60;
+/// Times as much or as little as was thought, from which on u² is another one.
+const LESS: f64 = 1.1;
+const MORE: f64 = 1.5;
+/// The most by which a tare lets a channel differ (standard deviations).
+const TARED_MOST: f64 = 3.0;
 
 /// The rest of every channel and what is known of its steps.
 pub(super) struct RestWalk {
     /// (e, D, v, δ).
     state: DVector<f64>,
-    /// Its covariance.
+    /// Its covariance, and what that was after the tare.
     pub covariance: DMatrix<f64>,
+    start: DMatrix<f64>,
     /// q² of each channel (strain² a second).
     own: Vec<f64>,
     least_own: Vec<f64>,
-    /// u².
+    /// u², as the covariance of δ has it.
     uneven: f64,
     /// When the window began, and what the rest has been corrected by in it.
     pub rested_s: Option<f64>,
@@ -70,15 +84,17 @@ impl RestWalk {
         let n = noise.len();
         let least = |x: &f64| (x / (follows_s * rate.sqrt())).max(OWN).powi(2);
         let least_own: Vec<f64> = noise.iter().map(least).collect();
-        let mut variances = DVector::from_element(2 * n + 2, UNEVEN * UNEVEN);
+        let mut covariance = DMatrix::zeros(2 * n + 2, 2 * n + 2);
         for (c, x) in noise.iter().enumerate() {
-            variances[c] = (TARED * x).powi(2);
+            covariance[(c, c)] = (TARED * x).powi(2);
         }
-        variances[n] = TARED_TOGETHER * TARED_TOGETHER;
-        variances[n + 1] = SPEED * SPEED;
+        covariance[(n, n)] = TARED_TOGETHER * TARED_TOGETHER;
+        covariance[(n + 1, n + 1)] = SPEED * SPEED;
+        spread_factors(&mut covariance, UNEVEN * UNEVEN);
         let mut walk = Self {
             state: DVector::zeros(2 * n + 2),
-            covariance: DMatrix::from_diagonal(&variances),
+            start: covariance.clone(),
+            covariance,
             own: least_own.clone(),
             least_own,
             uneven: UNEVEN * UNEVEN,
@@ -95,19 +111,28 @@ impl RestWalk {
     /// What a tare has shown of the drift (strain a second).
     fn tared(&mut self, drift: &[f64]) {
         let n = drift.len();
-        let speed = mean(drift);
+        let Some(speed) = median(drift.iter().copied()).filter(|speed| speed.is_finite()) else {
+            return;
+        };
         self.state[n + 1] = speed;
         // How uneven they are is known as well as it shows how far they have gone.
         let shown = (SHOWN / (TARED_S * speed)).powi(2);
-        if !shown.is_finite() {
-            return;
+        if shown.is_finite() {
+            let most = TARED_MOST * UNEVEN;
+            for (c, d) in drift.iter().enumerate() {
+                self.tell_factor(c, (d / speed - 1.0).clamp(-most, most), shown);
+            }
         }
-        for (c, d) in drift.iter().enumerate() {
-            let at = n + 2 + c;
-            let gain = self.covariance[(at, at)] / (self.covariance[(at, at)] + shown);
-            self.state[at] = gain * (d / speed - 1.0);
-            self.covariance[(at, at)] *= 1.0 - gain;
-        }
+    }
+
+    /// Takes δ of a channel for a measured one.
+    fn tell_factor(&mut self, channel: usize, is: f64, variance: f64) {
+        let k = self.channels() + 2 + channel;
+        let column = self.covariance.column(k).into_owned();
+        let gain = &column / (column[k] + variance);
+        self.state.axpy(is - self.state[k], &gain, 1.0);
+        self.covariance.ger(-1.0, &gain, &column, 1.0);
+        keep_a_covariance(&mut self.covariance);
     }
 
     fn channels(&self) -> usize {
@@ -155,9 +180,8 @@ impl RestWalk {
         let speed = p.column(n + 1) * seconds;
         let mut together = p.column_mut(n);
         together += speed;
-        let changed = if hidden { 0.0 } else { seconds / CHANGES_S };
-        for c in n + 2..2 * n + 2 {
-            p[(c, c)] += changed * self.uneven;
+        if !hidden {
+            spread_factors(&mut p, self.uneven * seconds / CHANGES_S);
         }
         let least = if hidden { HIDDEN * HIDDEN } else { 0.0 };
         for (c, own) in self.own.iter().enumerate() {
@@ -213,7 +237,12 @@ impl RestWalk {
             let way = of_trusted(way);
             inner.ger(1.0, &way, &way, 1.0);
         }
-        let (factor, off) = (inner.cholesky()?, of_trusted(off));
+        let Some(factor) = inner.cholesky() else {
+            // Rounding has made it none: what a tare knows is known again.
+            self.covariance = self.start.clone();
+            return None;
+        };
+        let off = of_trusted(off);
         let count = trusted.len() as f64;
         if off.dot(&factor.solve(&off)) > count + most * (2.0 * count).sqrt() {
             return None;
@@ -228,6 +257,20 @@ impl RestWalk {
         let before: Vec<f64> = self.rest(0.0).collect();
         self.state += correction;
         Some(self.rest(0.0).zip(before).map(|(b, was)| b - was).collect())
+    }
+
+    /// The rest is where it is: what all have drifted until now is taken for each channel's own.
+    pub fn settle(&mut self) {
+        let n = self.channels();
+        let by = self.jacobian();
+        let mut into = DMatrix::identity(2 * n + 2, 2 * n + 2);
+        into.rows_mut(0, n).copy_from(&by);
+        into[(n, n)] = 0.0;
+        let rest: Vec<f64> = self.rest(0.0).collect();
+        self.state.rows_mut(0, n).copy_from_slice(&rest);
+        self.state[n] = 0.0;
+        self.covariance = &into * &self.covariance * into.transpose();
+        keep_a_covariance(&mut self.covariance);
     }
 
     /// Takes a correction at rest for what the rest walks by.
@@ -259,35 +302,70 @@ impl RestWalk {
         }
     }
 
-    /// u² from what is known of δ: from those directions of it that readings have told of, as many as they are. Where it is
-    /// less than was thought, every δ is known better by as much: what a tighter prior says beside the one before is a
-    /// measurement of nothing, δ = 0 ± r.
+    /// The likeliest u² by what readings have told of δ. Where it is less than was thought, every δ is known better by as much:
+    /// what a tighter prior says beside the one before is a measurement of nothing, δ = 0 ± r. Where it is more, they are
+    /// known worse.
     fn learn_unevenness(&mut self) {
+        let Some(uneven) = self.likeliest_unevenness() else {
+            return;
+        };
+        if uneven < self.uneven / LESS {
+            let tighter = uneven.recip() - self.uneven.recip();
+            for c in 0..self.channels() {
+                self.tell_factor(c, 0.0, tighter.recip());
+            }
+            self.uneven = uneven;
+        } else if uneven > MORE * self.uneven {
+            spread_factors(&mut self.covariance, uneven - self.uneven);
+            self.uneven = uneven;
+        }
+    }
+
+    /// Of the directions of δ that are independent each has been measured, as m ± r, beside what u² says of it: m is normal
+    /// of variance u² + r². Nothing where too few of them are known.
+    fn likeliest_unevenness(&self) -> Option<f64> {
         let n = self.channels();
+        if (n as f64) <= FEWEST {
+            return None;
+        }
         let known = self.covariance.view((n + 2, n + 2), (n, n));
         let known = SymmetricEigen::new(known.into_owned());
         let along = known.eigenvectors.tr_mul(&self.state.rows(n + 2, n));
-        let pairs = known.eigenvalues.iter().zip(along.iter());
-        let told = pairs.filter(|(variance, _)| **variance < TOLD * self.uneven);
-        let (count, squares) = told.fold((0.0, 0.0), |(count, sum), (variance, along)| {
-            (count + 1.0, sum + along * along + variance)
+        // One of them is the mean, of which there is nothing to tell.
+        let mean = known.eigenvalues.imin();
+        let share = |k: usize| (1.0 - known.eigenvalues[k] / self.uneven).clamp(1e-6, 1.0);
+        let directions = (0..n).filter(|&k| k != mean);
+        if directions.clone().map(share).sum::<f64>() < FEWEST.max(n as f64 / 2.0) {
+            return None;
+        }
+        let measured: Vec<[f64; 2]> = directions
+            .map(|k| {
+                [
+                    (along[k] / share(k)).powi(2),
+                    self.uneven * (share(k).recip() - 1.0),
+                ]
+            })
+            .collect();
+        let unlikely = |u2: f64| {
+            let of = |[square, r2]: &[f64; 2]| (u2 + r2).ln() + square / (u2 + r2);
+            measured.iter().map(of).sum::<f64>() + BELIEF * (u2.ln() + ALIKE * ALIKE / u2)
+        };
+        let tried = (0..TRIED).map(|k| {
+            let share = f64::from(k) / f64::from(TRIED - 1);
+            (LEAST_UNEVEN * (MOST_UNEVEN / LEAST_UNEVEN).powf(share)).powi(2)
         });
-        if count < FEWEST {
-            return;
+        tried.min_by(|a, b| unlikely(*a).total_cmp(&unlikely(*b)))
+    }
+}
+
+/// Makes the factors of all channels uncertain by so much more (variance), and not their mean.
+fn spread_factors(p: &mut DMatrix<f64>, variance: f64) {
+    let n = p.nrows() / 2 - 1;
+    for i in 0..n {
+        for j in 0..n {
+            let of_both = f64::from(u8::from(i == j)) - (n as f64).recip();
+            p[(n + 2 + i, n + 2 + j)] += variance * of_both;
         }
-        let uneven = (squares + BELIEF * ALIKE * ALIKE) / (count + BELIEF);
-        let tighter = uneven.recip() - self.uneven.recip();
-        self.uneven = uneven;
-        if tighter <= 0.0 {
-            return;
-        }
-        for k in n + 2..2 * n + 2 {
-            let column = self.covariance.column(k).into_owned();
-            let gain = &column / (column[k] + tighter.recip());
-            self.state.axpy(-self.state[k], &gain, 1.0);
-            self.covariance.ger(-1.0, &gain, &column, 1.0);
-        }
-        keep_a_covariance(&mut self.covariance);
     }
 }
 
@@ -299,77 +377,5 @@ fn keep_a_covariance(p: &mut DMatrix<f64>) {
             (p[(i, j)], p[(j, i)]) = (mean, mean);
         }
         p[(i, i)] = p[(i, i)].max(1e-20);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const N: usize = 10;
-    const NOISE: f64 = 1e-6;
-    const STEP_S: f64 = 0.01;
-
-    /// A walk that has followed drifts (strain a second) for so many seconds, by blocks whose noise is small; the first
-    /// `hidden` channels are read for three seconds only.
-    fn followed(speeds: &[f64; N], seconds: f64, hidden: usize) -> RestWalk {
-        let mut walk = RestWalk::new(&[NOISE; N], &[], 3.0, 200.0);
-        let variance = [NOISE * NOISE / 2.0; N];
-        let mut used = [true; N];
-        for k in 1..=(seconds / STEP_S) as u32 {
-            let now = f64::from(k) * STEP_S;
-            if now > 3.0 {
-                used[..hidden].fill(false);
-            }
-            walk.pass(STEP_S, now > 3.0);
-            let wave = |c: usize| 0.7 * NOISE * (f64::from(k) * (1.3 + c as f64)).sin();
-            let read = (0..N).map(|c| speeds[c] * now + wave(c));
-            let off: Vec<f64> = read.zip(walk.rest(0.0)).map(|(x, b)| x - b).collect();
-            let corrected = walk.correct((&off, f64::INFINITY), &variance, &used, &[]);
-            assert!(corrected.is_some());
-        }
-        walk
-    }
-
-    /// Three channels that nobody reads for two minutes drift as the others are seen to; their uncertainty says so.
-    #[test]
-    fn what_is_hidden_drifts_as_the_others_do() {
-        let walk = followed(&[2e-6; N], 120.0, 3);
-        let covariance = walk.rest_covariance(0.0, true);
-        for (c, rest) in walk.rest(0.0).take(3).enumerate() {
-            let off = (rest - 240e-6).abs();
-            let deviation = covariance[(c, c)].sqrt();
-            assert!(
-                deviation < 4e-6 && off < 2.0 * deviation,
-                "{c}: {off} of {deviation}"
-            );
-        }
-    }
-
-    #[test]
-    fn channels_that_drift_unevenly_are_told() {
-        let speeds: [f64; N] = std::array::from_fn(|c| if c % 2 == 0 { 2.4e-6 } else { 1.6e-6 });
-        let walk = followed(&speeds, 20.0, 0);
-        let mean = mean(&speeds);
-        for (speed, found) in speeds.iter().zip(walk.speeds()) {
-            assert!((found - speed).abs() < 0.05 * mean, "{found}");
-        }
-        assert!(walk.uneven.sqrt() > 0.1, "{}", walk.uneven.sqrt());
-        let even = followed(&[2e-6; N], 20.0, 0);
-        assert!(even.uneven.sqrt() < 0.03, "{}", even.uneven.sqrt());
-    }
-
-    #[test]
-    fn what_comes_at_once_is_no_drift() {
-        let mut walk = followed(&[0.0; N], 5.0, 0);
-        let before: Vec<f64> = walk.rest(0.0).collect();
-        let mut jump = [0.0; N];
-        jump[3] = 40e-6;
-        let refused = walk.correct((&jump, 8.0), &[NOISE * NOISE; N], &[true; N], &[]);
-        assert!(refused.is_none() && walk.rest(0.0).eq(before));
-        // Where it is a way in which the touch may be another one, it says nothing of the rest.
-        let ways = [vec![0.0; N], jump.map(|x| 10.0 * x).to_vec()];
-        let taken = walk.correct((&jump, 8.0), &[NOISE * NOISE; N], &[true; N], &ways);
-        assert!(taken.is_some_and(|by| by.iter().all(|b| b.abs() < 0.5e-6)));
     }
 }
