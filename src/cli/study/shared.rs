@@ -96,6 +96,8 @@ impl SharedSimulations {
             read(&path, inputs, &budget, watch)?
         };
         let was_there = kept.is_some();
+        // Of another program, or damaged: it is written anew.
+        let is_unreadable = kept.is_none() && path.exists();
         let simulated = match kept {
             Some(kept) => kept,
             None => Arc::new(design::simulate(inputs, &budget, watch)?),
@@ -106,7 +108,8 @@ impl SharedSimulations {
             missing: others,
             path,
         };
-        if !was_there && last.is_needed(folder) && !last.path.exists() {
+        let is_missing = is_unreadable || !last.path.exists();
+        if !was_there && last.is_needed(folder) && is_missing {
             // Where there is no room for it, it is computed again.
             let made = std::fs::create_dir_all(folder.shared());
             let _ = made.is_ok() && kept_simulation::write(&last.path, &simulated).is_ok();

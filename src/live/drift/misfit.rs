@@ -23,6 +23,8 @@ struct FoundTouch {
     force: f64,
     is_area: bool,
     left: Vec<f64>,
+    /// The ways in which it may be another one, and with them those of the touch that it was before.
+    own: Vec<Vec<f64>>,
     ways: Vec<Vec<f64>>,
 }
 
@@ -47,12 +49,16 @@ impl Misfit {
             f.is_area == is_area && f.place.distance(place) < STAYS && force < HARDER * f.force
         };
         let Some(found) = self.found.as_ref().filter(stays) else {
+            let own = ways();
+            // What a drift puts into a touch makes it another one little by little: the ways of the one before stay free.
+            let before = self.found.take().map_or_else(Vec::new, |before| before.own);
             self.found = Some(FoundTouch {
                 place,
                 force,
                 is_area,
                 left: left.to_vec(),
-                ways: ways(),
+                ways: [own.clone(), before].concat(),
+                own,
             });
             return None;
         };

@@ -119,7 +119,8 @@ impl RestWalk {
         let shown = (SHOWN / (TARED_S * speed)).powi(2);
         if shown.is_finite() {
             let most = TARED_MOST * UNEVEN;
-            for (c, d) in drift.iter().enumerate() {
+            let sound = drift.iter().enumerate().filter(|(_, d)| d.is_finite());
+            for (c, d) in sound {
                 self.tell_factor(c, (d / speed - 1.0).clamp(-most, most), shown);
             }
         }
@@ -239,7 +240,7 @@ impl RestWalk {
         }
         let Some(factor) = inner.cholesky() else {
             // Rounding has made it none: what a tare knows is known again.
-            self.covariance = self.start.clone();
+            (self.covariance, self.uneven) = (self.start.clone(), UNEVEN * UNEVEN);
             return None;
         };
         let off = of_trusted(off);

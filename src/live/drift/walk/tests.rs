@@ -65,7 +65,7 @@ const AT_REST: Told = Told {
 
 fn uneven(by: f64) -> [f64; N] {
     // Of mean nothing and of rms one.
-    let signs = [1.6, -1.2, 0.5, -0.9, 1.1, -1.6, 0.9, -0.5, 1.2, -1.1];
+    let signs = [0.5, -0.9, 1.1, -1.6, 0.9, -0.5, 1.2, -1.1, 1.6, -1.2];
     let rms = (signs.iter().map(|s| s * s).sum::<f64>() / N as f64).sqrt();
     signs.map(|s| 2e-6 * (1.0 + by * s / rms))
 }
