@@ -11,13 +11,13 @@ use super::ground::{
 };
 use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
 use super::nearness::{Nearness, check_reach};
+use super::on_supports::on_supports;
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, Surveyed};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
-use crate::elasticity::support::HeldRegion;
-use crate::elasticity::{DofSet, Model, Support, Touch};
+use crate::elasticity::{DofSet, Model, Touch};
 use crate::feasible::SiteSurroundings;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain::digits;
@@ -362,42 +362,6 @@ impl Simulated {
     pub fn usual_wall(&self) -> Option<f64> {
         Ground::of(&self.meshed).usual_wall()
     }
-}
-
-/// A word where many touches press on what is held: they move next to nothing, so that no gauge can tell them
-/// apart, and rule every mean.
-fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, DesignError> {
-    /// Share of the touches from which it is worth a word.
-    const WORTH: f64 = 0.05;
-    let count = on_what_is_held(inputs, touches)?.len();
-    Ok((count as f64 > WORTH * touches.len() as f64).then(|| {
-        format!(
-            "{count} of {} touches press on what a support holds: next to nothing moves there, and no gauge can tell where they are. Paint where touches come (touch.region), or go by the errors of a region ([[evaluation.region]]).",
-            touches.len()
-        )
-    }))
-}
-
-/// Which touches press on what a support holds in all directions.
-///
-/// # Errors
-/// [`DesignError::Value`] for a support that names no layer there is.
-pub fn on_what_is_held(inputs: &Inputs, touches: &[Touch]) -> Result<Vec<usize>, DesignError> {
-    let supports = inputs.project.supports(&inputs.masks)?;
-    let holds = |s: &&Support| s.bedding.is_none() && (0..3).all(|i| s.held.holds(i));
-    let held: Vec<&Support> = supports.iter().filter(holds).collect();
-    let index = inputs.part.index();
-    let is_held = |&k: &usize| {
-        let touch = &touches[k];
-        held.iter().any(|support| match &support.region {
-            HeldRegion::Box(held) => held.contains(touch.position, 0.0),
-            HeldRegion::Vertices(mask) => {
-                let at = index.nearest(touch.position).0;
-                inputs.part.mostly_in(mask, at)
-            }
-        })
-    };
-    Ok((0..touches.len()).filter(is_held).collect())
 }
 
 /// What the solution was checked for.

@@ -93,7 +93,7 @@ fn what_is_hidden_drifts_as_the_others_do() {
     }
 }
 
-/// For minutes, and after that without a drift.
+/// For minutes; and without a drift none is made up.
 #[test]
 fn channels_that_drift_unevenly_are_told_and_stay_so() {
     for by in [0.0, 0.2] {
