@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, anyhow, ensure};
 use clap::Parser as _;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use toml::Value;
 
 use super::limb_options::{LimbOptions, made};
@@ -313,12 +314,26 @@ fn limb_args(study: &ParameterStudy, values: &[Value]) -> anyhow::Result<Option<
     if words.len() == bare {
         return Ok(None);
     }
-    let said = |e: clap::Error| {
-        let text = e.to_string();
-        let line = text.lines().next().unwrap_or_default();
-        anyhow!("{}", line.trim_start_matches("error: "))
-    };
-    Ok(Some(LimbFlags::try_parse_from(words).map_err(said)?.limb))
+    let limb = LimbFlags::try_parse_from(words).map_err(|e| refused(&e))?;
+    Ok(Some(limb.limb))
+}
+
+/// What is wrong with the options of a limb, as axes of a study.
+fn refused(error: &clap::Error) -> anyhow::Error {
+    if error.kind() == ErrorKind::MissingRequiredArgument {
+        let missing = match error.get(ContextKind::InvalidArg) {
+            Some(ContextValue::Strings(missing)) => missing.as_slice(),
+            _ => &[],
+        };
+        let names: Vec<String> = (missing.iter())
+            .filter_map(|name| name.trim_start_matches("--").split_whitespace().next())
+            .map(|name| format!("limb.{name}"))
+            .collect();
+        return anyhow!("it takes another axis beside it: {}", names.join(", "));
+    }
+    let text = error.to_string();
+    let line = text.lines().next().unwrap_or_default();
+    anyhow!("{}", line.trim_start_matches("error: "))
 }
 
 /// Sets the keys of a unit in a project's table.

@@ -252,6 +252,15 @@ fn limbs_of_the_family_are_varied_by_their_options() {
         table.contains("1,1000000000.0,60,failed") && table.contains("height"),
         "{table}"
     );
+    // Columns are of a regular grid, which has hoops too.
+    let alone = text.replace("height\"\nvalues = [60, 1e9]", "columns\"\nvalues = [4]");
+    fs::write(study.path("wrong.toml"), alone).unwrap();
+    let wrong = [study.text("wrong.toml"), study.text("wrong")];
+    let said = refused(&["study", "plan", &wrong[0], "--out", &wrong[1]]);
+    assert!(
+        said.contains("limb.columns: it takes another axis beside it: limb.hoops"),
+        "{said}"
+    );
 }
 
 #[test]
