@@ -10,6 +10,7 @@
 
 mod creep;
 mod misfit;
+mod steps;
 mod walk;
 
 use std::collections::VecDeque;
@@ -33,6 +34,9 @@ const BEFORE_S: f64 = 0.05;
 /// Standard deviations, and strain, by which rest may be off from what follows it: beyond them a touch goes or comes.
 const STEADY: f64 = 5.0;
 const STEADY_BY: f64 = 1.5e-6;
+
+/// By how much a channel may bend because it creeps (strain), where it is asked how far it walks.
+const CREEPS: f64 = 0.1e-6;
 
 /// Under a touch, standard deviations of χ² beyond which what is left is of another touch than was found, and not of a
 /// rest that has moved: that goes slowly.
@@ -174,6 +178,11 @@ impl Drift {
             let off: Vec<f64> = off.map(|(x, b)| x - b).collect();
             let variance: Vec<f64> = noise.iter().map(|n| n * n / block.samples).collect();
             let off = (&off[..], f64::INFINITY);
+            let bends = self.creep.bends_by(steps::STRETCH_S);
+            if bends < CREEPS {
+                let read = (&block.mean[..], block.samples);
+                (self.walk.steps).rested(read, block.ends_s, noise, used);
+            }
             if let Some(correction) = self.walk.correct(off, &variance, used, &[]) {
                 self.walk.settle();
                 self.walk.learn(&correction, self.as_of_s);
@@ -252,6 +261,7 @@ impl Drift {
     fn forget(&mut self) {
         self.waiting.clear();
         self.misfit.forget();
+        self.walk.steps.interrupted();
         (self.samples, self.walk.rested_s, self.believed) = (0.0, None, false);
     }
 

@@ -6,6 +6,8 @@ const ENDS: u32 = 6;
 /// Of the squares that a touch usually has: what is less is hardly the same touch; and the share of a sample in these.
 const GONE: f64 = 0.25;
 const USUAL: f64 = 0.01;
+/// Seconds after which what no touch explains may be what one has left behind. A finger that comes to another is found sooner.
+const STRANGE_S: f64 = 0.1;
 /// Too few gauges to tell anything: place and force are three numbers.
 const FEWEST: f64 = 3.0;
 /// Standard deviations of χ² by which a touch is above what it has on the mean, when it begins and until it ends.
@@ -20,6 +22,8 @@ pub(super) struct Feeling {
     /// Weighted squares that the touch usually has.
     usual: f64,
     pub touching: bool,
+    /// Seconds since touches explained what is felt.
+    strange_s: f64,
 }
 
 /// What has become of a touch with a sample.
@@ -44,8 +48,8 @@ impl Feeling {
     /// Takes in a sample's weighted squares, and these with caution, over so many channels.
     pub fn take(&mut self, [plain, cautious]: [f64; 2], channels: usize) -> Turn {
         let channels = channels as f64;
-        // A touch that stands goes on; what is left when most of it has gone may be what it hid.
-        let gone = !self.touching || plain < GONE * self.usual;
+        // A touch that stands goes on; what is left when most of it has gone, or when no touch reads so, may be what it hid.
+        let gone = !self.touching || self.strange_s >= STRANGE_S || plain < GONE * self.usual;
         let squares = if gone { cautious } else { plain };
         self.usual += (plain - self.usual) * if self.touching { USUAL } else { 1.0 };
         let scatter = (2.0 * channels).sqrt();
@@ -63,8 +67,54 @@ impl Feeling {
         Turn::Same
     }
 
+    /// Whether touches explain a sample, some seconds after the one before.
+    pub fn explained(&mut self, explained: bool, step_s: f64) {
+        self.strange_s = if explained {
+            0.0
+        } else {
+            self.strange_s + step_s
+        };
+    }
+
     /// Nothing touches.
     pub fn end(&mut self) {
         (self.above, self.below, self.touching) = (0, 0, false);
+        self.strange_s = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of ten channels: a touch that stands, and then so many samples (10 ms) of which touches explain what they do or nothing.
+    fn turns(squares: [f64; 2], explained: bool, samples: u32) -> Vec<Turn> {
+        let mut feeling = Feeling::default();
+        for _ in 0..200 {
+            feeling.take([200.0, 12.0], 10);
+            feeling.explained(true, 0.01);
+        }
+        assert!(feeling.clearly());
+        (0..samples)
+            .map(|_| {
+                feeling.explained(explained, 0.01);
+                feeling.take(squares, 10)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn what_a_touch_may_have_hidden_is_no_touch_once_nothing_explains_it() {
+        let ended = |turns: &[Turn]| turns.iter().position(|t| *t == Turn::Ends);
+        // As much as before, and as little in doubt.
+        assert_eq!(ended(&turns([180.0, 12.0], true, 100)), None);
+        let left = turns([70.0, 7.0], false, 100);
+        assert!((10..20).contains(&ended(&left).unwrap()));
+        // Too much for what was hidden.
+        assert_eq!(ended(&turns([3000.0, 190.0], false, 100)), None);
+        // A moment in which another finger comes.
+        assert_eq!(ended(&turns([180.0, 12.0], false, 8)), None);
+        // Most of it has gone.
+        assert_eq!(ended(&turns([40.0, 3.0], true, 10)), Some(5));
     }
 }

@@ -278,6 +278,8 @@ impl Pipeline {
         } else {
             (None, false)
         };
+        let is_found = touches.as_ref().is_some_and(|t| !t.contacts.is_empty());
+        self.feeling.explained(is_found, step_s);
         if self.release.is_sure(self.proved) {
             self.tare();
             self.news = Some(RestNews::Released);

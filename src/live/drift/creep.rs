@@ -47,6 +47,15 @@ impl Creep {
         }
     }
 
+    /// By how much the rest may bend in some seconds (strain), as it comes back from what it crept to.
+    pub fn bends_by(&self, seconds: f64) -> f64 {
+        let most = self
+            .relaxing
+            .iter()
+            .fold(0.0, |most: f64, r| most.max(r.abs()));
+        ALIKE * most * (seconds / SECONDS).powi(2)
+    }
+
     /// What has crept alike was part of the touch, and stays when that goes.
     pub fn let_go(&self, covariance: &mut DMatrix<f64>) {
         if self.loaded {

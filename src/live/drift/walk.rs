@@ -13,14 +13,16 @@
 //! D is how far all have drifted since the last correction at rest: what lies before is in e. The mean of δ is nothing:
 //! half as large a D with factors twice as large would be the same.
 //!
-//! How uneven channels are, u, is learned from what is known of all of them (empirical Bayes: C. N. Morris, J. American Stat.
-//! Association 78, 1983): where those that a touch does not hide drift alike, the others do so too.
+//! How uneven channels are, u, is learned from what is known of all of them (a hierarchical model: A. Gelman, Bayesian
+//! Analysis 1, 2006): where those that a touch does not hide drift alike, the others do so too. How far each walks by
+//! itself, q, is told at rest ([`Steps`]): what were thought to walk less than it does would be taken for uneven.
 
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use super::steps::Steps;
 use crate::statistics::{mean, median};
 
 /// What a channel walks by in a second at least, and what all do together beside their speed (strain): a workshop is never
@@ -41,15 +43,13 @@ const SHOWN: f64 = 0.4e-6;
 /// Seconds at rest after which it is asked how far the rest has walked, and in which that is believed.
 const WINDOW_S: f64 = 0.25;
 const BELIEVED_S: f64 = 5.0;
-/// u before anything is known, what it is believed to be where all drift alike and for how many channels that belief
-/// counts, and the seconds at rest in which channels change in that.
+/// u before anything is known: half of all boards are less uneven than the first, and by the mean of their squares the
+/// second, as a normal law of ln u has it. And the seconds at rest in which channels change in that.
+const HALF_UNEVEN: f64 = 0.05;
 const UNEVEN: f64 = 0.1;
-const ALIKE: f64 = 0.02;
-const BELIEF: f64 = 2.0;
 const CHANGES_S: f64 = 200.0;
-/// u is learned from half of the directions of δ at least, and from so many; between these values, of which so many are tried.
-const FEWEST: f64 = 4.0;
-const LEAST_UNEVEN: f64 = 0.005;
+/// u is one of so many between these.
+const LEAST_UNEVEN: f64 = 0.003;
 const MOST_UNEVEN: f64 = 0.8;
 const TRIED: u32 = 60;
 /// Times as much or as little as was thought, from which on u² is another one.
@@ -65,8 +65,9 @@ pub(super) struct RestWalk {
     /// Its covariance, and what that was after the tare.
     pub covariance: DMatrix<f64>,
     start: DMatrix<f64>,
-    /// q² of each channel (strain² a second).
+    /// q² of each channel (strain² a second), as corrections at rest have it and as its steps do, and the least.
     own: Vec<f64>,
+    pub steps: Steps,
     least_own: Vec<f64>,
     /// u², as the covariance of δ has it.
     uneven: f64,
@@ -96,6 +97,7 @@ impl RestWalk {
             start: covariance.clone(),
             covariance,
             own: least_own.clone(),
+            steps: Steps::new(n),
             least_own,
             uneven: UNEVEN * UNEVEN,
             rested_s: None,
@@ -186,7 +188,7 @@ impl RestWalk {
         }
         let least = if hidden { HIDDEN * HIDDEN } else { 0.0 };
         for (c, own) in self.own.iter().enumerate() {
-            p[(c, c)] += own.max(least) * seconds;
+            p[(c, c)] += own.max(self.steps.variance(c)).max(least) * seconds;
         }
         p[(n, n)] += TOGETHER * TOGETHER * seconds;
         p[(n + 1, n + 1)] += HURRIES * HURRIES * seconds;
@@ -303,11 +305,11 @@ impl RestWalk {
         }
     }
 
-    /// The likeliest u² by what readings have told of δ. Where it is less than was thought, every δ is known better by as much:
-    /// what a tighter prior says beside the one before is a measurement of nothing, δ = 0 ± r. Where it is more, they are
-    /// known worse.
+    /// u² by what readings have told of δ. Where it is less than was thought, every δ is known better by as much: what a
+    /// tighter prior says beside the one before is a measurement of nothing, δ = 0 ± r. Where it is more, they are known
+    /// worse.
     fn learn_unevenness(&mut self) {
-        let Some(uneven) = self.likeliest_unevenness() else {
+        let Some(uneven) = self.expected_unevenness() else {
             return;
         };
         if uneven < self.uneven / LESS {
@@ -322,11 +324,11 @@ impl RestWalk {
         }
     }
 
-    /// Of the directions of δ that are independent each has been measured, as m ± r, beside what u² says of it: m is normal
-    /// of variance u² + r². Nothing where too few of them are known.
-    fn likeliest_unevenness(&self) -> Option<f64> {
+    /// The mean of u² by what is known of δ and of boards at all. Of the directions of δ that are independent each has been
+    /// measured, as m ± r, beside what u² says of it: m is normal of variance u² + r². Nothing where there are none.
+    fn expected_unevenness(&self) -> Option<f64> {
         let n = self.channels();
-        if (n as f64) <= FEWEST {
+        if n < 2 {
             return None;
         }
         let known = self.covariance.view((n + 2, n + 2), (n, n));
@@ -334,28 +336,30 @@ impl RestWalk {
         let along = known.eigenvectors.tr_mul(&self.state.rows(n + 2, n));
         // One of them is the mean, of which there is nothing to tell.
         let mean = known.eigenvalues.imin();
-        let share = |k: usize| (1.0 - known.eigenvalues[k] / self.uneven).clamp(1e-6, 1.0);
-        let directions = (0..n).filter(|&k| k != mean);
-        if directions.clone().map(share).sum::<f64>() < FEWEST.max(n as f64 / 2.0) {
-            return None;
-        }
-        let measured: Vec<[f64; 2]> = directions
+        let measured: Vec<[f64; 2]> = (0..n)
+            .filter(|&k| k != mean)
             .map(|k| {
-                [
-                    (along[k] / share(k)).powi(2),
-                    self.uneven * (share(k).recip() - 1.0),
-                ]
+                let share = (1.0 - known.eigenvalues[k] / self.uneven).clamp(1e-6, 1.0);
+                let r2 = self.uneven * (share.recip() - 1.0);
+                [(along[k] / share).powi(2), r2]
             })
             .collect();
-        let unlikely = |u2: f64| {
-            let of = |[square, r2]: &[f64; 2]| (u2 + r2).ln() + square / (u2 + r2);
-            measured.iter().map(of).sum::<f64>() + BELIEF * (u2.ln() + ALIKE * ALIKE / u2)
+        let usual = (UNEVEN / HALF_UNEVEN).ln();
+        let unlikely = |u: f64| {
+            let of = |[square, r2]: &[f64; 2]| (u * u + r2).ln() + square / (u * u + r2);
+            measured.iter().map(of).sum::<f64>() + (u / HALF_UNEVEN).ln().powi(2) / usual
         };
-        let tried = (0..TRIED).map(|k| {
-            let share = f64::from(k) / f64::from(TRIED - 1);
-            (LEAST_UNEVEN * (MOST_UNEVEN / LEAST_UNEVEN).powf(share)).powi(2)
-        });
-        tried.min_by(|a, b| unlikely(*a).total_cmp(&unlikely(*b)))
+        let tried: Vec<[f64; 2]> = (0..TRIED)
+            .map(|k| {
+                let share = f64::from(k) / f64::from(TRIED - 1);
+                let u = LEAST_UNEVEN * (MOST_UNEVEN / LEAST_UNEVEN).powf(share);
+                [u * u, unlikely(u)]
+            })
+            .collect();
+        let least = tried.iter().map(|t| t[1]).fold(f64::INFINITY, f64::min);
+        let likely = |t: &[f64; 2]| (0.5 * (least - t[1])).exp();
+        let sum: f64 = tried.iter().map(likely).sum();
+        Some(tried.iter().map(|t| t[0] * likely(t)).sum::<f64>() / sum)
     }
 }
 
