@@ -89,8 +89,7 @@ fn main() {
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+    rng.sample(rand_distr::StandardNormal)
 }
 
 /// The model, touches nobody has trained on, and what was trained.

@@ -3,11 +3,11 @@
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
-/// Standard normal, by Box and Muller.
+/// Standard normal.
 pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+    rng.sample(StandardNormal)
 }
 
 /// All subsets of `size` among `count`, in order, or `most` different ones drawn by the seed.

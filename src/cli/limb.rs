@@ -76,7 +76,7 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
 /// Seed of the draws that the example's gauges are chosen by. Sets of other draws are expected to be as little off, but a
 /// choice asks for nothing else: how well they tell two fingers apart and feel light touches under a drift differs from
 /// set to set, and the example is one that does both well (RESULTS.md, “Ten gauges are not ten gauges”).
-const EXAMPLE_SEED: u64 = 2;
+const EXAMPLE_SEED: u64 = 11;
 
 /// Ten sites by a Draft design, as the project chooses them.
 fn choose_sites(

@@ -22,8 +22,7 @@ fn budget() -> Budget {
 
 /// Standard normal, by Box and Muller.
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+    rng.sample(rand_distr::StandardNormal)
 }
 
 /// A set of gauges, as sites of the dataset.
