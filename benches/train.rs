@@ -186,11 +186,7 @@ fn some(
 }
 
 fn worn(x: &SignalMatrix, rng: &mut ChaCha8Rng) -> SignalMatrix {
-    // By Box and Muller.
-    let mut normal = || {
-        let (u, v): (f64, f64) = (rng.random(), rng.random());
-        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-    };
+    let mut normal = || -> f64 { rng.sample(rand_distr::StandardNormal) };
     let mut values = Vec::with_capacity(x.values().len());
     for channel in 0..x.rows() {
         let row = x.row(channel);

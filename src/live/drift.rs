@@ -170,6 +170,7 @@ impl Drift {
                 return;
             };
             if !steady {
+                self.walk.steps.interrupted();
                 continue;
             }
             self.believed = true;
@@ -180,8 +181,8 @@ impl Drift {
             let off = (&off[..], f64::INFINITY);
             let bends = self.creep.bends_by(steps::STRETCH_S);
             if bends < CREEPS {
-                let read = (&block.mean[..], block.samples);
-                (self.walk.steps).rested(read, block.ends_s, noise, used);
+                let read = (&block.mean[..], block.samples, block.ends_s);
+                self.walk.rested(read, noise, used);
             }
             if let Some(correction) = self.walk.correct(off, &variance, used, &[]) {
                 self.walk.settle();

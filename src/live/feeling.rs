@@ -7,7 +7,7 @@ const ENDS: u32 = 6;
 const GONE: f64 = 0.25;
 const USUAL: f64 = 0.01;
 /// Seconds after which what no touch explains may be what one has left behind. A finger that comes to another is found sooner.
-const STRANGE_S: f64 = 0.1;
+const STRANGE_S: f64 = 0.2;
 /// Too few gauges to tell anything: place and force are three numbers.
 const FEWEST: f64 = 3.0;
 /// Standard deviations of χ² by which a touch is above what it has on the mean, when it begins and until it ends.
@@ -22,7 +22,7 @@ pub(super) struct Feeling {
     /// Weighted squares that the touch usually has.
     usual: f64,
     pub touching: bool,
-    /// Seconds since touches explained what is felt.
+    /// Seconds since touches were found in what is felt.
     strange_s: f64,
 }
 
@@ -67,12 +67,13 @@ impl Feeling {
         Turn::Same
     }
 
-    /// Whether touches explain a sample, some seconds after the one before.
-    pub fn explained(&mut self, explained: bool, step_s: f64) {
-        self.strange_s = if explained {
-            0.0
-        } else {
+    /// Whether touches were found in a sample, some seconds after the one before.
+    pub fn found(&mut self, is_found: bool, step_s: f64) {
+        let goes_on = self.touching && !is_found;
+        self.strange_s = if goes_on {
             self.strange_s + step_s
+        } else {
+            0.0
         };
     }
 
@@ -87,17 +88,18 @@ impl Feeling {
 mod tests {
     use super::*;
 
-    /// Of ten channels: a touch that stands, and then so many samples (10 ms) of which touches explain what they do or nothing.
-    fn turns(squares: [f64; 2], explained: bool, samples: u32) -> Vec<Turn> {
+    /// Of ten channels: a touch that stands, and then so many samples (10 ms) in which touches are found or none.
+    fn turns(squares: [f64; 2], is_found: bool, samples: u32) -> Vec<Turn> {
         let mut feeling = Feeling::default();
-        for _ in 0..200 {
-            feeling.take([200.0, 12.0], 10);
-            feeling.explained(true, 0.01);
+        for k in 0..200 {
+            // The longer it stands the less is known of the rest.
+            feeling.take([200.0, if k < 10 { 200.0 } else { 12.0 }], 10);
+            feeling.found(true, 0.01);
         }
         assert!(feeling.clearly());
         (0..samples)
             .map(|_| {
-                feeling.explained(explained, 0.01);
+                feeling.found(is_found, 0.01);
                 feeling.take(squares, 10)
             })
             .collect()
@@ -109,11 +111,11 @@ mod tests {
         // As much as before, and as little in doubt.
         assert_eq!(ended(&turns([180.0, 12.0], true, 100)), None);
         let left = turns([70.0, 7.0], false, 100);
-        assert!((10..20).contains(&ended(&left).unwrap()));
+        assert!((20..30).contains(&ended(&left).unwrap()));
         // Too much for what was hidden.
         assert_eq!(ended(&turns([3000.0, 190.0], false, 100)), None);
         // A moment in which another finger comes.
-        assert_eq!(ended(&turns([180.0, 12.0], false, 8)), None);
+        assert_eq!(ended(&turns([180.0, 12.0], false, 15)), None);
         // Most of it has gone.
         assert_eq!(ended(&turns([40.0, 3.0], true, 10)), Some(5));
     }

@@ -279,7 +279,7 @@ impl Pipeline {
             (None, false)
         };
         let is_found = touches.as_ref().is_some_and(|t| !t.contacts.is_empty());
-        self.feeling.explained(is_found, step_s);
+        self.feeling.found(is_found, step_s);
         if self.release.is_sure(self.proved) {
             self.tare();
             self.news = Some(RestNews::Released);

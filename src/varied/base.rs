@@ -160,7 +160,7 @@ impl UnitBase {
             // The options' names are clap's to know.
             let values = Points::of(study).map_err(|why| anyhow!(why))?.values(0);
             let made = limb_args(study, &values);
-            made.with_context(|| format!("the axis {}", axis.key))?;
+            made.with_context(|| format!("the axes of the limb ({} …)", axis.key))?;
         }
         Ok(())
     }
@@ -329,7 +329,10 @@ fn refused(error: &clap::Error) -> anyhow::Error {
             .filter_map(|name| name.trim_start_matches("--").split_whitespace().next())
             .map(|name| format!("limb.{name}"))
             .collect();
-        return anyhow!("it takes another axis beside it: {}", names.join(", "));
+        return anyhow!(
+            "one of them takes another axis beside it: {}",
+            names.join(", ")
+        );
     }
     let text = error.to_string();
     let line = text.lines().next().unwrap_or_default();

@@ -20,7 +20,7 @@ fn budget() -> Budget {
     Quality::Draft.budget()
 }
 
-/// Standard normal, by Box and Muller.
+/// Standard normal.
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     rng.sample(rand_distr::StandardNormal)
 }

@@ -258,7 +258,7 @@ fn limbs_of_the_family_are_varied_by_their_options() {
     let wrong = [study.text("wrong.toml"), study.text("wrong")];
     let said = refused(&["study", "plan", &wrong[0], "--out", &wrong[1]]);
     assert!(
-        said.contains("limb.columns: it takes another axis beside it: limb.hoops"),
+        said.contains("limb.columns …): one of them takes another axis beside it: limb.hoops"),
         "{said}"
     );
 }

@@ -14,14 +14,17 @@ use hapdef::io::project_file;
 use serde_json::Value;
 
 const FORCES_N: [f64; 3] = [3.0, 10.0, 25.0];
-/// Workshops that the gauges are glued by: a single one is a seventh better or worse than they are in the mean.
-const WORKSHOPS: [u64; 3] = [1, 2, 3];
+/// Workshops that the gauges are glued by: a single one is a seventh better or worse than they are in the mean, and a fifth
+/// after a calibration.
+const WORKSHOPS: [u64; 6] = [1, 2, 3, 4, 5, 6];
 /// Where errors are compared: outside it are touches that move no gauge. Live says of them that nothing touches, and
 /// there is nothing to compare with the error that a judge gives to their best guess.
 const REGION: &str = "away from the boundaries";
 /// How far what is achieved may be from what was promised, by other workshops and hands than those that the judge drew, and
 /// the share of the samples that must be felt.
 const KEPT: std::ops::Range<f64> = 0.8..1.15;
+/// The same after a calibration: six workshops here and the judge's eight are a tenth apart by chance.
+const KEPT_CALIBRATED: std::ops::Range<f64> = 0.75..1.25;
 const FELT: f64 = 0.99;
 
 /// When the first press begins, one begins after another, and how long it lasts (s). Between them is time to let go.
@@ -316,17 +319,17 @@ fn what_is_promised_is_what_is_achieved() {
         );
     }
     let mut broken = Vec::new();
-    for (which, achieved) in [
-        ("error_mm", exact),
-        ("as_built_mm", mean(&built)),
-        ("calibrated_mm", mean(&calibrated)),
+    for (which, achieved, kept) in [
+        ("error_mm", exact, KEPT),
+        ("as_built_mm", mean(&built), KEPT),
+        ("calibrated_mm", mean(&calibrated), KEPT_CALIBRATED),
     ] {
         for (force, achieved) in FORCES_N.into_iter().zip(achieved) {
             let promised = designed.promised(force, which);
             let words =
                 format!("{force} N, {which}: {promised:.2} promised, {achieved:.2} achieved");
             println!("{words}");
-            if !KEPT.contains(&(achieved / promised)) {
+            if !kept.contains(&(achieved / promised)) {
                 broken.push(words);
             }
         }

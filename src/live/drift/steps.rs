@@ -4,7 +4,7 @@
 //! E (x − 2 y + z)² = q² T, to which noise σ adds 6 σ²/m of m samples a stretch. What drifts at a steady speed adds
 //! nothing: a channel that drifts more than the others is no channel that walks.
 
-use crate::statistics::mean;
+use crate::statistics::median;
 
 /// Seconds of a stretch.
 pub(super) const STRETCH_S: f64 = 4.0;
@@ -13,6 +13,8 @@ pub(super) const STRETCH_S: f64 = 4.0;
 const USUAL: f64 = 0.1e-6;
 const USUAL_COUNTS: f64 = 2.0;
 const REMEMBERED: f64 = 30.0;
+/// Standard deviations by which a bend counts at most: what comes and goes once is no walk.
+const MOST: f64 = 4.0;
 
 /// What the stretches of rest have told.
 pub(super) struct Steps {
@@ -25,6 +27,8 @@ pub(super) struct Steps {
     /// Sum of what was told (strain² a second), each by its weight, and these.
     told: Vec<f64>,
     weight: Vec<f64>,
+    /// The channels that all of it is of.
+    used: Vec<bool>,
 }
 
 impl Steps {
@@ -37,6 +41,7 @@ impl Steps {
             before: Vec::new(),
             told: vec![0.0; channels],
             weight: vec![0.0; channels],
+            used: Vec::new(),
         }
     }
 
@@ -46,14 +51,19 @@ impl Steps {
         (told / (self.weight[channel] + USUAL_COUNTS)).max(0.0)
     }
 
-    /// Takes the mean (strain) of some samples at rest, at a time, with the noise of one (strain).
+    /// Takes the mean (strain) of some samples at rest, at a time, with the noise of one (strain), where each channel drifts by
+    /// a factor of its own.
     pub fn rested(
         &mut self,
-        (read, samples): (&[f64], f64),
-        now_s: f64,
+        (read, samples, now_s): (&[f64], f64, f64),
         noise: &[f64],
         used: &[bool],
+        factors: &[f64],
     ) {
+        if self.used != used {
+            self.interrupted();
+            self.used = used.to_vec();
+        }
         for (sum, x) in self.sum.iter_mut().zip(read) {
             *sum += samples * x;
         }
@@ -64,7 +74,7 @@ impl Steps {
         }
         let mean: Vec<f64> = self.sum.iter().map(|sum| sum / self.samples).collect();
         self.before.insert(0, (mean, self.samples.recip()));
-        self.look_back(noise, used);
+        self.look_back(noise, factors);
         self.before.truncate(2);
         self.sum.fill(0.0);
         (self.samples, self.since_s) = (0.0, Some(now_s));
@@ -78,33 +88,32 @@ impl Steps {
     }
 
     /// What the last three stretches tell.
-    fn look_back(&mut self, noise: &[f64], used: &[bool]) {
+    fn look_back(&mut self, noise: &[f64], factors: &[f64]) {
         let [(z, of_z), (y, of_y), (x, of_x)] = &self.before[..] else {
             return;
         };
         let left = of_x + 4.0 * of_y + of_z;
         let bend = |c: usize| x[c] - 2.0 * y[c] + z[c];
-        let trusted: Vec<usize> = (0..noise.len()).filter(|&c| used[c]).collect();
-        let count = trusted.len() as f64;
-        if count < 2.0 {
+        let trusted: Vec<usize> = (0..noise.len()).filter(|&c| self.used[c]).collect();
+        // What all do together is a drift. Of fewer channels nobody could tell.
+        let Some(together) = median(trusted.iter().map(|&c| bend(c))) else {
+            return;
+        };
+        if trusted.len() < 3 {
             return;
         }
-        let together = mean(&trusted.iter().map(|&c| bend(c)).collect::<Vec<_>>());
-        let told: Vec<(usize, f64, f64)> = (trusted.into_iter())
-            .map(|c| {
-                // The mean has taken a share of each with it.
-                let square = (bend(c) - together).powi(2) * count / (count - 1.0);
-                let noisy = noise[c] * noise[c] * left;
-                let walked = self.variance(c) * STRETCH_S;
-                // χ² of one degree of freedom of all of it: the more of it is noise, the less it tells.
-                let weight = (walked / (walked + noisy)).powi(2);
-                (c, (square - noisy) / STRETCH_S, weight)
-            })
-            .collect();
-        for (c, is, weight) in told.into_iter().filter(|(_, _, w)| w.is_finite()) {
-            let kept = 1.0 - REMEMBERED.recip();
-            self.told[c] = kept * self.told[c] + weight * is;
-            self.weight[c] = kept * self.weight[c] + weight;
+        for c in trusted {
+            let noisy = noise[c] * noise[c] * left;
+            let walked = self.variance(c) * STRETCH_S;
+            let most = MOST * MOST * (walked + noisy);
+            let square = (bend(c) - factors[c] * together).powi(2).min(most);
+            // χ² of one degree of freedom of all of it: the more of it is noise, the less it tells.
+            let weight = (walked / (walked + noisy)).powi(2);
+            if weight.is_finite() && square.is_finite() {
+                let kept = 1.0 - REMEMBERED.recip();
+                self.told[c] = kept * self.told[c] + weight * (square - noisy) / STRETCH_S;
+                self.weight[c] = kept * self.weight[c] + weight;
+            }
         }
     }
 }
@@ -117,23 +126,38 @@ mod tests {
     use super::*;
     use crate::draw::normal;
 
-    /// Blocks of ten samples of 1 µε at 100 Hz, of channels that walk by `walk` and drift by 2 µε/s times 0.9 to 1.1.
-    fn told(walk: f64, seconds: f64) -> Vec<f64> {
-        const CHANNELS: usize = 8;
+    const CHANNELS: usize = 8;
+
+    /// What is told of blocks of ten samples of 1 µε at 100 Hz, of channels that walk by so much and drift by 2 µε/s times 0.9 to 1.1;
+    /// the first one stands still, and is off by `leaps` for a second after 30 s.
+    fn told(walk: f64, leaps: f64, is_seen: bool) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let (mut steps, mut rest) = (Steps::new(CHANNELS), [0.0; CHANNELS]);
-        let blocks = (seconds / 0.1).round() as usize;
-        for k in 1..=blocks {
+        for k in 1..=1200 {
             let mut read = [0.0; CHANNELS];
             for (c, rest) in rest.iter_mut().enumerate() {
                 let uneven = 0.9 + 0.2 * c as f64 / (CHANNELS - 1) as f64;
-                *rest += 2e-7 * uneven + walk * 0.1_f64.sqrt() * normal(&mut rng);
+                let own = if c == 0 { 0.0 } else { walk };
+                *rest += 2e-7 * uneven + own * 0.1_f64.sqrt() * normal(&mut rng);
                 read[c] = *rest + 1e-6 / 10_f64.sqrt() * normal(&mut rng);
             }
-            let now_s = 0.1 * k as f64;
-            steps.rested((&read, 10.0), now_s, &[1e-6; CHANNELS], &[true; CHANNELS]);
+            let is_off = (300..310).contains(&k);
+            read[0] += if is_off { leaps } else { 0.0 };
+            let mut used = [true; CHANNELS];
+            used[0] = !(is_off && is_seen);
+            let now_s = 0.1 * f64::from(k);
+            steps.rested(
+                (&read, 10.0, now_s),
+                &[1e-6; CHANNELS],
+                &used,
+                &[1.0; CHANNELS],
+            );
         }
         (0..CHANNELS).map(|c| steps.variance(c).sqrt()).collect()
+    }
+
+    fn rms(told: &[f64]) -> f64 {
+        (told.iter().map(|q| q * q).sum::<f64>() / told.len() as f64).sqrt()
     }
 
     #[test]
@@ -143,30 +167,43 @@ mod tests {
             (0.1e-6, 0.06e-6..0.15e-6),
             (1e-6, 0.7e-6..1.3e-6),
         ] {
-            let told = told(walk, 120.0);
-            let rms = mean(&told.iter().map(|q| q * q).collect::<Vec<_>>()).sqrt();
-            assert!(range.contains(&rms), "{walk}: {rms}, {told:?}");
+            let told = told(walk, 0.0, false);
+            assert!(range.contains(&rms(&told[1..])), "{walk}: {told:?}");
+            // One that stands still among others that walk.
+            assert!(told[0] < 0.06e-6 + 0.5 * walk, "{walk}: {told:?}");
         }
     }
 
     #[test]
-    fn nothing_is_told_across_a_touch_or_by_noise_alone() {
-        let mut steps = Steps::new(2);
+    fn a_channel_that_was_left_out_or_leapt_once_is_no_walker() {
+        let still = told(0.0, 0.0, false);
+        let left_out = told(0.0, 1000e-6, true);
+        assert!(left_out.iter().all(|q| *q < 0.1e-6), "{left_out:?}");
+        let leapt = told(0.0, 5e-6, false);
+        assert!(leapt[0] < 0.5e-6, "{leapt:?}");
+        assert!(
+            rms(&leapt[1..]) < 1.5 * rms(&still[1..]),
+            "{leapt:?} {still:?}"
+        );
+    }
+
+    #[test]
+    fn nothing_is_told_across_a_touch() {
+        let mut steps = Steps::new(3);
         let mut now_s = 0.0;
         for jump in [0.0, 50e-6, -30e-6] {
             // Never three stretches in a row.
             for _ in 0..80 {
                 now_s += 0.1;
-                steps.rested((&[jump, 0.0], 10.0), now_s, &[1e-6; 2], &[true; 2]);
+                steps.rested(
+                    (&[jump, 0.0, 0.0], 10.0, now_s),
+                    &[1e-6; 3],
+                    &[true; 3],
+                    &[1.0; 3],
+                );
             }
             steps.interrupted();
         }
         assert!((steps.variance(0).sqrt() - USUAL).abs() < 1e-12);
-        for k in 0..1000 {
-            now_s += 0.1;
-            let read = [20e-6 * f64::from(k % 7 - 3), 0.0];
-            steps.rested((&read, 10.0), now_s, &[100e-6; 2], &[true; 2]);
-        }
-        assert!(steps.variance(0).sqrt() < 2.0 * USUAL);
     }
 }

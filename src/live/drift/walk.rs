@@ -7,7 +7,7 @@
 //! e ← e + w                w ~ N(0, diag(q²) Δ)
 //! D ← D + v Δ + w'         w' ~ N(0, q_D² Δ)
 //! v ← v + w″               w″ ~ N(0, q_v² Δ)
-//! δ ← δ + w‴               w‴ ~ N(0, u² Δ/T), of which a touch says nothing
+//! δ ← a δ + w‴             w‴ ~ N(0, u² (1 − a²)), a² = exp(−Δ/T), of which a touch says nothing
 //! ```
 //!
 //! D is how far all have drifted since the last correction at rest: what lies before is in e. The mean of δ is nothing:
@@ -15,7 +15,7 @@
 //!
 //! How uneven channels are, u, is learned from what is known of all of them (a hierarchical model: A. Gelman, Bayesian
 //! Analysis 1, 2006): where those that a touch does not hide drift alike, the others do so too. How far each walks by
-//! itself, q, is told at rest ([`Steps`]): what were thought to walk less than it does would be taken for uneven.
+//! itself, q, is told at rest ([`Steps`]): a channel that was thought to walk less than it does would be taken for an uneven one.
 
 #[cfg(test)]
 mod tests;
@@ -43,11 +43,14 @@ const SHOWN: f64 = 0.4e-6;
 /// Seconds at rest after which it is asked how far the rest has walked, and in which that is believed.
 const WINDOW_S: f64 = 0.25;
 const BELIEVED_S: f64 = 5.0;
-/// u before anything is known: half of all boards are less uneven than the first, and by the mean of their squares the
-/// second, as a normal law of ln u has it. And the seconds at rest in which channels change in that.
+/// What boards are like before anything is known of one: half of them are less uneven than the first, and the mean of u² is
+/// the square of the second, with ln u normal. And the seconds at rest in which factors become others (T).
 const HALF_UNEVEN: f64 = 0.05;
 const UNEVEN: f64 = 0.1;
 const CHANGES_S: f64 = 200.0;
+/// Of so many directions of δ something has to be known before u is thought to be larger: a drift that has just begun tells nothing
+/// yet.
+const FEWEST: f64 = 2.0;
 /// u is one of so many between these.
 const LEAST_UNEVEN: f64 = 0.003;
 const MOST_UNEVEN: f64 = 0.8;
@@ -165,6 +168,10 @@ impl RestWalk {
         let n = self.channels();
         self.covariance = self.later(seconds, hidden);
         self.state[n] += seconds * self.state[n + 1];
+        if !hidden {
+            let kept = (-0.5 * seconds / CHANGES_S).exp();
+            self.state.rows_mut(n + 2, n).scale_mut(kept);
+        }
         self.asked_s += seconds;
         if self.asked_s >= WINDOW_S {
             self.asked_s = 0.0;
@@ -184,7 +191,10 @@ impl RestWalk {
         let mut together = p.column_mut(n);
         together += speed;
         if !hidden {
-            spread_factors(&mut p, self.uneven * seconds / CHANGES_S);
+            let kept = (-0.5 * seconds / CHANGES_S).exp();
+            p.rows_mut(n + 2, n).scale_mut(kept);
+            p.columns_mut(n + 2, n).scale_mut(kept);
+            spread_factors(&mut p, self.uneven * (1.0 - kept * kept));
         }
         let least = if hidden { HIDDEN * HIDDEN } else { 0.0 };
         for (c, own) in self.own.iter().enumerate() {
@@ -262,6 +272,12 @@ impl RestWalk {
         Some(self.rest(0.0).zip(before).map(|(b, was)| b - was).collect())
     }
 
+    /// Some samples at rest, as [`Steps::rested`] takes them.
+    pub fn rested(&mut self, read: (&[f64], f64, f64), noise: &[f64], used: &[bool]) {
+        let factors: Vec<f64> = (0..self.channels()).map(|c| self.factor(c)).collect();
+        self.steps.rested(read, noise, used, &factors);
+    }
+
     /// The rest is where it is: what all have drifted until now is taken for each channel's own.
     pub fn settle(&mut self) {
         let n = self.channels();
@@ -309,7 +325,7 @@ impl RestWalk {
     /// tighter prior says beside the one before is a measurement of nothing, δ = 0 ± r. Where it is more, they are known
     /// worse.
     fn learn_unevenness(&mut self) {
-        let Some(uneven) = self.expected_unevenness() else {
+        let Some((uneven, known)) = self.expected_unevenness() else {
             return;
         };
         if uneven < self.uneven / LESS {
@@ -318,15 +334,16 @@ impl RestWalk {
                 self.tell_factor(c, 0.0, tighter.recip());
             }
             self.uneven = uneven;
-        } else if uneven > MORE * self.uneven {
+        } else if uneven > MORE * self.uneven && known >= FEWEST {
             spread_factors(&mut self.covariance, uneven - self.uneven);
             self.uneven = uneven;
         }
     }
 
     /// The mean of u² by what is known of δ and of boards at all. Of the directions of δ that are independent each has been
-    /// measured, as m ± r, beside what u² says of it: m is normal of variance u² + r². Nothing where there are none.
-    fn expected_unevenness(&self) -> Option<f64> {
+    /// measured, as m ± r, beside what u² says of it: m is normal of variance u² + r². With it the number of directions that are
+    /// known; nothing of a single channel.
+    fn expected_unevenness(&self) -> Option<(f64, f64)> {
         let n = self.channels();
         if n < 2 {
             return None;
@@ -336,10 +353,12 @@ impl RestWalk {
         let along = known.eigenvectors.tr_mul(&self.state.rows(n + 2, n));
         // One of them is the mean, of which there is nothing to tell.
         let mean = known.eigenvalues.imin();
-        let measured: Vec<[f64; 2]> = (0..n)
-            .filter(|&k| k != mean)
+        let share = |k: usize| (1.0 - known.eigenvalues[k] / self.uneven).clamp(1e-6, 1.0);
+        let directions = (0..n).filter(|&k| k != mean);
+        let count: f64 = directions.clone().map(share).sum();
+        let measured: Vec<[f64; 2]> = directions
             .map(|k| {
-                let share = (1.0 - known.eigenvalues[k] / self.uneven).clamp(1e-6, 1.0);
+                let share = share(k);
                 let r2 = self.uneven * (share.recip() - 1.0);
                 [(along[k] / share).powi(2), r2]
             })
@@ -359,7 +378,8 @@ impl RestWalk {
         let least = tried.iter().map(|t| t[1]).fold(f64::INFINITY, f64::min);
         let likely = |t: &[f64; 2]| (0.5 * (least - t[1])).exp();
         let sum: f64 = tried.iter().map(likely).sum();
-        Some(tried.iter().map(|t| t[0] * likely(t)).sum::<f64>() / sum)
+        let uneven = tried.iter().map(|t| t[0] * likely(t)).sum::<f64>() / sum;
+        Some((uneven, count))
     }
 }
 
