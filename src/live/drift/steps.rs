@@ -8,8 +8,9 @@ use crate::statistics::median;
 
 /// Seconds of a stretch.
 pub(super) const STRETCH_S: f64 = 4.0;
-/// What a channel walks by in a second before it is known (strain), for how many times that counts, and how many times are
-/// remembered.
+/// What a channel walks by in a second at least, and before it is known (strain), for how many times that counts, and how many
+/// times are remembered.
+const LEAST: f64 = 0.02e-6;
 const USUAL: f64 = 0.1e-6;
 const USUAL_COUNTS: f64 = 2.0;
 const REMEMBERED: f64 = 30.0;
@@ -48,7 +49,7 @@ impl Steps {
     /// q² of a channel (strain² a second).
     pub fn variance(&self, channel: usize) -> f64 {
         let told = self.told[channel] + USUAL_COUNTS * USUAL * USUAL;
-        (told / (self.weight[channel] + USUAL_COUNTS)).max(0.0)
+        (told / (self.weight[channel] + USUAL_COUNTS)).max(LEAST * LEAST)
     }
 
     /// Takes the mean (strain) of some samples at rest, at a time, with the noise of one (strain), where each channel drifts by
