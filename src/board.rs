@@ -14,6 +14,7 @@ use crate::draw::normal;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Push, Touch};
 use crate::inference::Chain;
+use crate::units;
 use crate::wire::{Decoded, Decoder, Hello, VERSION, WireMessage, encode};
 
 use disturbance::Disturbed;
@@ -106,8 +107,9 @@ pub struct SimulatedBoard {
     pub overruns: u32,
 }
 
+const SECOND_US: u64 = 1_000_000;
 /// Between two HELLOs while nothing is sent, and between two STATUSes (µs).
-const HELLO_EVERY: u64 = 1_000_000;
+const HELLO_EVERY: u64 = SECOND_US;
 const STATUS_EVERY: u64 = 5_000_000;
 /// Seconds after the first START of a listener in which random presses leave it alone: it takes its rest.
 const REST_S: f64 = 2.0;
@@ -171,9 +173,9 @@ impl SimulatedBoard {
             board: 0x5151_0000 | (self.options.seed as u32 & 0xFFFF),
             channels: self.options.channels as u8,
             bits: chain.bits,
-            reference_mv: (chain.reference_v * 1e3).round() as u16,
-            supply_mv: (chain.supply_v * 1e3).round() as u16,
-            gain_milli: (chain.gain * 1e3).round() as u32,
+            reference_mv: units::thousandths(chain.reference_v) as u16,
+            supply_mv: units::thousandths(chain.supply_v) as u16,
+            gain_milli: units::thousandths(chain.gain) as u32,
             rate_hz: self.rate_hz,
             name: self.options.name.clone(),
         }
@@ -182,7 +184,7 @@ impl SimulatedBoard {
     /// Whether the plug is out at a time.
     #[must_use]
     pub fn is_unplugged(&self, now_us: u64) -> bool {
-        self.faults.is_unplugged(now_us as f64 * 1e-6)
+        self.faults.is_unplugged(units::seconds(now_us))
     }
 
     /// Begins anew after the plug was out: nothing is sent until somebody asks.
@@ -215,7 +217,7 @@ impl SimulatedBoard {
                 WireMessage::AskHello => self.send(&WireMessage::Hello(self.hello()), now_us, out),
                 WireMessage::Start => {
                     if !self.streaming {
-                        let now_s = now_us as f64 * 1e-6;
+                        let now_s = units::seconds(now_us);
                         self.script.leave_alone(now_s + REST_S);
                     }
                     self.streaming = true;
@@ -249,7 +251,7 @@ impl SimulatedBoard {
             let (counts, pushes) = self.sample(time_us);
             self.send(&WireMessage::Data(counts), time_us, out);
             tell(Truth::of(time_us, &pushes));
-            self.next_us += 1_000_000 / u64::from(self.rate_hz);
+            self.next_us += SECOND_US / u64::from(self.rate_hz);
             if time_us / STATUS_EVERY != self.next_us / STATUS_EVERY {
                 let status = WireMessage::Status {
                     overruns: self.overruns,
@@ -276,7 +278,7 @@ impl SimulatedBoard {
 
     /// All channels at a time: strain, gain, what disturbs, noise, drift, offset, quantization, clipping.
     fn sample(&mut self, time_us: u64) -> (Vec<u32>, Vec<Push>) {
-        let seconds = time_us as f64 * 1e-6;
+        let seconds = units::seconds(time_us);
         let pushes = self.script.at(seconds);
         let strains = self.felt(&pushes, seconds);
         let mut counts: Vec<u32> = (0..self.options.channels)

@@ -20,6 +20,7 @@ use crate::elasticity::{Model, Push, Touch};
 use crate::gauge::Gauge;
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::uncertainty::Making;
+use crate::units;
 
 use site::{StrainMoments, gauges_on};
 use std::f64::consts::PI;
@@ -180,7 +181,7 @@ impl Dataset {
     pub fn targets_mm(&self) -> Vec<[f64; 3]> {
         self.touches
             .iter()
-            .map(|t| (t.position * 1000.0).to_array())
+            .map(|t| units::mm(t.position).to_array())
             .collect()
     }
 }

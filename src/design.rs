@@ -44,6 +44,7 @@ use crate::elasticity::ElasticError;
 use crate::placement::PlacementError;
 use crate::plain;
 use crate::project::BadValue;
+use crate::units;
 
 pub use self::advise::*;
 pub use self::by_hand::judge_set;
@@ -109,7 +110,8 @@ pub enum DesignError {
     },
     /// The lattice has more sites than can be handled.
     #[error(
-        "{count} sites at a spacing of {spacing_mm} mm are more than the {limit} this version handles: widen sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.0} mm across)"
+        "{count} sites at a spacing of {spacing_mm} mm are more than the {limit} this version handles: widen sites.spacing_mm or check the unit of the mesh (the part is {:.0} mm across)",
+        units::mm(*size)
     )]
     TooManySites {
         /// How many it would have.
@@ -118,24 +120,24 @@ pub enum DesignError {
         limit: usize,
         /// The spacing asked for (mm).
         spacing_mm: f64,
-        /// Diagonal of the part's box (mm).
-        size_mm: f64,
+        /// Diagonal of the part's box (m).
+        size: f64,
     },
     /// A point that was given lies far from the part.
     #[error(
         "{what} {number} lies {} from the part, which is {} across: check the unit of the mesh and of the points (mm)",
-        plain::mm(*distance_mm),
-        plain::mm(*size_mm)
+        plain::length(*distance),
+        plain::length(*size)
     )]
     OffThePart {
         /// A touch or a site.
         what: &'static str,
         /// Which one.
         number: usize,
-        /// How far off it is (mm).
-        distance_mm: f64,
-        /// Diagonal of the part's box (mm).
-        size_mm: f64,
+        /// How far off it is (m).
+        distance: f64,
+        /// Diagonal of the part's box (m).
+        size: f64,
     },
     /// A gauge's direction points out of the surface.
     #[error(
@@ -159,74 +161,83 @@ pub enum DesignError {
     },
     /// The wall of a shell is thicker than the part is wide.
     #[error(
-        "the part is {size_mm:.3} mm across and its wall {thickness_mm:.3} mm thick: this is no shell. Check the unit of the mesh and part.thickness_mm"
+        "the part is {:.3} mm across and its wall {thickness_mm:.3} mm thick: this is no shell. Check the unit of the mesh and part.thickness_mm",
+        units::mm(*size)
     )]
     ThickerThanWide {
-        /// Diagonal of the part's box (mm).
-        size_mm: f64,
+        /// Diagonal of the part's box (m).
+        size: f64,
         /// Thickness of the wall (mm).
         thickness_mm: f64,
     },
     /// One vertex lies far from all others.
     #[error(
-        "one vertex of the part, at {place_mm:.3} mm, lies {distance_mm:.3} mm from all the others, which are {size_mm:.3} mm across: remove or move it in the program that wrote the mesh"
+        "one vertex of the part, at {:.3} mm, lies {:.3} mm from all the others, which are {:.3} mm across: remove or move it in the program that wrote the mesh",
+        units::mm(*place),
+        units::mm(*distance),
+        units::mm(*size)
     )]
     FarVertex {
-        /// Where it is (mm).
-        place_mm: DVec3,
-        /// How far from the others (mm).
-        distance_mm: f64,
-        /// Diagonal of the others' box (mm).
-        size_mm: f64,
+        /// Where it is (m).
+        place: DVec3,
+        /// How far from the others (m).
+        distance: f64,
+        /// Diagonal of the others' box (m).
+        size: f64,
     },
     /// The part is all long thin triangles.
     #[error(
-        "the part is too slender for elements: its longest edge has {longest_mm:.3} mm, and all of its surface {area_mm2:.3} mm². Remove the long thin triangles in the program that wrote the mesh, or check for vertices in a wrong place"
+        "the part is too slender for elements: its longest edge has {:.3} mm, and all of its surface {:.3} mm². Remove the long thin triangles in the program that wrote the mesh, or check for vertices in a wrong place",
+        units::mm(*longest),
+        units::mm2(*area)
     )]
     Slender {
-        /// Its longest edge (mm).
-        longest_mm: f64,
-        /// Its area (mm²).
-        area_mm2: f64,
+        /// Its longest edge (m).
+        longest: f64,
+        /// Its area (m²).
+        area: f64,
     },
     /// The unrolled part is too large for a lattice of this spacing.
     #[error(
-        "unrolled about its axis the part is {round_mm:.0} mm round and {high_mm:.0} mm high, too much for sites every {spacing_mm} mm: choose sites.lattice = \"even\", another part.axis, or a wider sites.spacing_mm"
+        "unrolled about its axis the part is {:.0} mm round and {:.0} mm high, too much for sites every {spacing_mm} mm: choose sites.lattice = \"even\", another part.axis, or a wider sites.spacing_mm",
+        units::mm(*round),
+        units::mm(*high)
     )]
     WideLattice {
-        /// Length around the axis (mm).
-        round_mm: f64,
-        /// Length along it (mm).
-        high_mm: f64,
+        /// Length around the axis (m).
+        round: f64,
+        /// Length along it (m).
+        high: f64,
         /// The spacing asked for (mm).
         spacing_mm: f64,
     },
     /// The spacing is too wide for even one site.
     #[error(
-        "no site fits on the part: {spacing_mm} mm (sites.spacing_mm) is too wide for a part of {size_mm:.3} mm across and {area_mm2:.3} mm². Lower it to less than {fits_mm:.3}, or check the unit of the mesh"
+        "no site fits on the part: {spacing_mm} mm (sites.spacing_mm) is too wide for a part of {:.3} mm across and {:.3} mm². Lower it to less than {:.3}, or check the unit of the mesh",
+        units::mm(*size),
+        units::mm2(*area),
+        units::mm(area.sqrt())
     )]
     NoRoom {
         /// The spacing asked for (mm).
         spacing_mm: f64,
-        /// Diagonal of the part's box (mm).
-        size_mm: f64,
-        /// Of the surface that gauges are glued to.
-        area_mm2: f64,
-        /// Where one site fits.
-        fits_mm: f64,
+        /// Diagonal of the part's box (m).
+        size: f64,
+        /// Of the surface that gauges are glued to (m²), as wide as which one site fits.
+        area: f64,
     },
     /// More memory would be needed than may be taken.
     #[error(
         "{} would be needed for {sites} sites × {touches} touches, more than the {} that may be taken: {}, or allow more with --memory-gb",
-        plain::needed_gb(*needed_gb),
-        plain::allowed_gb(*limit_gb),
+        plain::needed(*needed),
+        plain::allowed(*limit),
         said_by.remedy()
     )]
     TooLarge {
-        /// How much is needed (GB).
-        needed_gb: f64,
-        /// How much may be taken (GB).
-        limit_gb: f64,
+        /// How much is needed (bytes).
+        needed: f64,
+        /// How much may be taken (bytes).
+        limit: f64,
         /// Sites asked for.
         sites: usize,
         /// Touches asked for.

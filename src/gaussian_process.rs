@@ -337,7 +337,7 @@ pub fn edge_notes(map: &[GpTrial]) -> Vec<String> {
     let length = far.map(|far| {
         format!(
             "The kernel's length is at the end of what was tried ({} mm), so {far}. Check the unit of the sites.",
-            crate::plain::digits(best.length_m * 1e3)
+            crate::plain::digits(crate::units::mm(best.length_m))
         )
     });
     let rough = (best.power == POWERS[0]).then(|| {

@@ -107,6 +107,7 @@ pub mod tally;
 pub mod test_bed;
 pub mod trade;
 pub mod uncertainty;
+pub mod units;
 #[allow(missing_docs)]
 pub mod varied;
 pub mod wire;

@@ -20,9 +20,3 @@ pub fn allow(bytes: u64) {
 pub fn allowed() -> f64 {
     ALLOWED.load(Ordering::Relaxed) as f64
 }
-
-/// What may be taken (GB), as messages say it.
-#[must_use]
-pub fn allowed_gb() -> f64 {
-    allowed() / 1e9
-}

@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use crate::units;
+
 /// Longest word that is quoted in a message, in characters.
 const WORD: usize = 60;
 /// Longest message: what one screen holds, in characters.
@@ -82,21 +84,22 @@ pub fn digits(number: f64) -> String {
     three_digits(number, f64::round)
 }
 
-/// Memory that something needs (GB): rounded up, so that what is too much reads so.
+/// Memory that something needs (bytes): rounded up, so that what is too much reads so.
 #[must_use]
-pub fn needed_gb(gigabytes: f64) -> String {
-    format!("{} GB", three_digits(gigabytes, f64::ceil))
+pub fn needed(bytes: f64) -> String {
+    format!("{} GB", three_digits(units::gigabytes(bytes), f64::ceil))
 }
 
-/// Memory that may be taken (GB): rounded down.
+/// Memory that may be taken (bytes): rounded down.
 #[must_use]
-pub fn allowed_gb(gigabytes: f64) -> String {
-    format!("{} GB", three_digits(gigabytes, f64::floor))
+pub fn allowed(bytes: f64) -> String {
+    format!("{} GB", three_digits(units::gigabytes(bytes), f64::floor))
 }
 
-/// A length (mm) of any size, in a few characters.
+/// A length (m) of any size, in a few characters.
 #[must_use]
-pub fn mm(length: f64) -> String {
+pub fn length(metres: f64) -> String {
+    let length = units::mm(metres);
     match length.abs() {
         size if !size.is_finite() => "endlessly many mm".to_owned(),
         size if size >= 1e7 || (size > 0.0 && size < 0.01) => format!("{length:.1e} mm"),
@@ -130,7 +133,7 @@ pub fn robust_top(values: &[f64]) -> f64 {
         .collect();
     sizes.sort_by(f64::total_cmp);
     let last = sizes.len().saturating_sub(1);
-    round_up(sizes.get(last * 995 / 1000).copied().unwrap_or(1.0))
+    round_up(sizes.get(last - last.div_ceil(200)).copied().unwrap_or(1.0))
 }
 
 /// The next round number.
@@ -257,7 +260,7 @@ mod tests {
             (0.0, "0.00 mm"),
             (f64::INFINITY, "endlessly many mm"),
         ] {
-            assert_eq!(mm(length), said);
+            assert_eq!(super::length(units::from_mm(length)), said);
         }
     }
 
@@ -279,8 +282,8 @@ mod tests {
             assert_eq!(digits(number), said);
         }
         // What is too much by a hair reads so.
-        assert_eq!(needed_gb(8.000_001), "8.01 GB");
-        assert_eq!(allowed_gb(8.009), "8 GB");
+        assert_eq!(needed(8_000_001e3), "8.01 GB");
+        assert_eq!(allowed(8.009e9), "8 GB");
         assert_eq!(count(1, "gauge"), "1 gauge");
         assert_eq!(count(0, "gauge"), "0 gauges");
         assert_eq!(either(1, "edge was", "edges were"), "1 edge was");

@@ -46,6 +46,7 @@ pub use desk::Desk;
 pub use gauges::SAME_MM;
 pub use jobs::{JobEnd, Jobs, Running, Task, duration};
 pub use kept::chooser_title;
+pub use latest::{Latest, LatestDesk};
 pub use live::training::{train, training_touches};
 pub use live::{
     Awaited, Feed, Gathered, LEAST_KNOWN, Mishap, Recording, STRIPS_S, Strip, WANTED_KNOWN,

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::budget::Watch;
 use crate::design::{self, DesignError, Finest, Inputs, StageTime};
 use crate::project::BadValue;
+use crate::units;
 
 pub use self::front::{TradeConstraint, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
@@ -183,7 +184,7 @@ fn attempt(
         model_percent: design.simulated.discretization.displacement_percent,
         candidates: design.candidate_count(),
         sites_mm: (design.chosen().iter())
-            .map(|&s| (sites[s].gauge.position * 1e3).to_array())
+            .map(|&s| units::mm(sites[s].gauge.position).to_array())
             .collect(),
     })
 }

@@ -69,7 +69,7 @@ impl Gluing {
     pub fn in_words(&self) -> String {
         format!(
             "{} mm and {}° off and its gain off by {} %",
-            tidy(self.place * 1e3),
+            tidy(crate::units::mm(self.place)),
             tidy(self.angle.to_degrees()),
             tidy(self.gain * 100.0)
         )
@@ -147,7 +147,7 @@ impl HandPressing {
     pub fn in_words(&self) -> String {
         format!(
             "{} mm beside its place, {} % too hard or too soft, and with {} % of its force along the surface",
-            tidy(self.place * 1e3),
+            tidy(crate::units::mm(self.place)),
             tidy(self.force * 100.0),
             tidy(self.friction * 100.0)
         )

@@ -3,6 +3,13 @@
 
 pub use hapdef::io::cpu_seconds;
 
+/// CPU time (s) of this thread so far.
+pub fn thread_seconds() -> f64 {
+    use rustix::time::{ClockId, clock_gettime};
+    let spent = clock_gettime(ClockId::ThreadCPUTime);
+    spent.tv_sec as f64 + spent.tv_nsec as f64 * 1e-9
+}
+
 /// CPU time (s) of a 4000 × 4000 matrix product on one core.
 pub fn reference_seconds() -> f64 {
     let a = faer::Mat::<f64>::from_fn(4000, 4000, |i, j| ((i * 7 + j * 3) % 11) as f64);

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::Planned;
 use super::press::SampleMean;
+use crate::units;
 
 /// What the limb answers at a place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -91,7 +92,7 @@ impl CheckedForce {
         if earlier.abs() > near {
             return Some(format!(
                 "the tip meets it {:.2} mm {} than at first",
-                earlier.abs() * 1e3,
+                units::mm(earlier.abs()),
                 if earlier > 0.0 { "earlier" } else { "later" }
             ));
         }
@@ -155,7 +156,7 @@ impl Check {
     pub fn read(&mut self, depth: f64, force: Option<f64>, reading: &SampleMean, rest: &[f64]) {
         let mean = reading.mean();
         let change = mean.iter().zip(rest).map(|(m, r)| m - r).collect();
-        self.steps.push((depth * 1e3, force, change));
+        self.steps.push((units::mm(depth), force, change));
         self.deviation = reading.deviation_of_mean();
     }
 

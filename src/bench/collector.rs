@@ -14,6 +14,7 @@ use super::machine::Machine;
 use super::marlin::Marlin;
 use super::plan::Planned;
 use super::press::{PressLimits, SampleMean};
+use crate::units;
 
 /// What whoever drives it is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -333,7 +334,7 @@ impl Collector {
             Phase::Approach => axis.speed.min(NEARING),
             _ => axis.speed,
         };
-        let target = (axis.letter, axis.number(radial * 1e3), speed);
+        let target = (axis.letter, axis.number(units::mm(radial)), speed);
         self.go(vec![target], now_us, out);
     }
 }

@@ -2,6 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::units;
+
 /// One axis of a machine, and what its numbers mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MachineAxis {
@@ -22,7 +24,7 @@ impl MachineAxis {
     #[must_use]
     pub fn number(&self, way: f64) -> f64 {
         // As it is sent: three digits behind the point.
-        ((self.zero + self.sign * way) * 1e3).round() / 1e3
+        units::to_thousandths(self.zero + self.sign * way)
     }
 
     /// The way or angle of a number.
@@ -164,12 +166,12 @@ impl Machine {
     #[must_use]
     pub fn numbers(&self, pose: &Pose) -> Vec<(&MachineAxis, f64)> {
         let mut numbers = vec![
-            (&self.radial, self.radial.number(pose.radial * 1e3)),
-            (&self.along, self.along.number(pose.along * 1e3)),
+            (&self.radial, self.radial.number(units::mm(pose.radial))),
+            (&self.along, self.along.number(units::mm(pose.along))),
             (&self.rotary, self.rotary.number(pose.angle.to_degrees())),
         ];
         if let Some(lateral) = &self.lateral {
-            numbers.push((lateral, lateral.number(pose.lateral * 1e3)));
+            numbers.push((lateral, lateral.number(units::mm(pose.lateral))));
         }
         numbers
     }
@@ -179,10 +181,13 @@ impl Machine {
     pub fn pose_of(&self, number: impl Fn(&MachineAxis) -> f64) -> Pose {
         let way = |axis: &MachineAxis| axis.way(number(axis));
         Pose {
-            radial: way(&self.radial) * 1e-3,
-            along: way(&self.along) * 1e-3,
+            radial: units::from_mm(way(&self.radial)),
+            along: units::from_mm(way(&self.along)),
             angle: way(&self.rotary).to_radians(),
-            lateral: self.lateral.as_ref().map_or(0.0, way) * 1e-3,
+            lateral: self
+                .lateral
+                .as_ref()
+                .map_or(0.0, |axis| units::from_mm(way(axis))),
         }
     }
 

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::machine::{Machine, Pose};
 use super::mount::TableMount;
 use crate::mesh::TriMesh;
+use crate::units;
 
 /// A press that is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,11 +42,11 @@ pub fn plan(
     mount: &TableMount,
 ) -> Result<MachineReach, String> {
     let retreat = retreat(limb, machine, mount);
-    let number = machine.radial.number(retreat * 1e3);
+    let number = machine.radial.number(units::mm(retreat));
     if !machine.radial.reaches(number) {
         return Err(format!(
             "the tip must be {:.0} mm from the table's axis to be out of the limb's way, and {}{number:.1} is outside its range",
-            retreat * 1e3,
+            units::mm(retreat),
             machine.radial.letter
         ));
     }
@@ -60,7 +61,7 @@ pub fn plan(
             |pose| match in_the_way(limb, machine, mount, &pose, retreat) {
                 Some(at) => Err(format!(
                     "the tip meets the limb {:.0} mm before it",
-                    at * 1e3
+                    units::mm(at)
                 )),
                 None => Ok(pose),
             },

@@ -5,6 +5,8 @@ use std::collections::VecDeque;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::units;
+
 /// What goes wrong; probabilities a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PrinterFaults {
@@ -287,7 +289,7 @@ impl SimulatedPrinter {
 
     /// Lets time pass until `now_us`, and says what there is to say.
     pub fn say(&mut self, now_us: u64, out: &mut Vec<u8>) {
-        let seconds = now_us.saturating_sub(self.now_us) as f64 * 1e-6;
+        let seconds = units::seconds_between(self.now_us, now_us);
         self.now_us = now_us;
         if self.halted {
             return;

@@ -164,7 +164,7 @@ fn pressed(
     ensure!(
         off <= BESIDE,
         "the place of --touch is {} off the limb",
-        plain::mm(off * 1e3)
+        plain::length(off)
     );
     let sensing = sensing_for(&args.common, loaded)
         .context("what a touch does is computed with the gauges of a project")?;

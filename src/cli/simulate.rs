@@ -17,6 +17,7 @@ use crate::io::artifacts::save_dataset;
 use crate::io::project_file::LoadedProject;
 use crate::io::{points, vtu};
 use crate::memory;
+use crate::units;
 
 #[derive(Args, Debug, Clone)]
 pub struct SimulateArgs {
@@ -89,11 +90,12 @@ fn check_output(path: &Path, endings: &[&str]) -> anyhow::Result<()> {
 
 fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
     let budget = loaded.inputs.project.budget.budget();
-    let (sites, touches, gigabytes) = design::expected_size(&loaded.inputs, &budget);
+    let (sites, touches, bytes) = design::expected_size(&loaded.inputs, &budget);
     // What cannot be had is refused with its cause; a figure before it would only be in the way.
-    if gigabytes <= memory::allowed_gb() {
+    if bytes <= memory::allowed() {
         out::say(&format!(
-            "about {sites} sites × {touches} touches: {gigabytes:.2} GB while they are computed"
+            "about {sites} sites × {touches} touches: {:.2} GB while they are computed",
+            units::gigabytes(bytes)
         ));
     }
     let bar = Bar::default();

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use self::cost::Workload;
 use super::ground::solid_ground;
-use super::layout::size_mm;
+use super::layout::size;
 use super::{DesignError, Ground, Inputs, ground};
 use crate::budget::Watch;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
@@ -20,6 +20,7 @@ use crate::mesh::sample;
 use crate::mesh::walls::WallSide;
 use crate::plain::{self, digits};
 use crate::project::PartModel;
+use crate::units;
 
 pub use self::cost::Cost;
 
@@ -33,13 +34,16 @@ const MOST_THEORY: f64 = 5.0;
 pub struct Advice {
     /// Whether it encloses anything.
     pub closed: bool,
-    /// Thickness (mm) that a tenth, half and nine tenths of the walls are thinner than; of an open part as its
+    /// Thickness (m) that a tenth, half and nine tenths of the walls are thinner than; of an open part as its
     /// project says.
-    pub wall_mm: [f64; 3],
-    /// Radius (mm) that a tenth and half of the walls are bent tighter than; infinite where they are flat.
-    pub radius_mm: [f64; 2],
-    /// Diagonal of the part's box (mm).
-    pub size_mm: f64,
+    #[serde(rename = "wall_mm", serialize_with = "units::all_as_mm")]
+    pub wall: [f64; 3],
+    /// Radius (m) that a tenth and half of the walls are bent tighter than; infinite where they are flat.
+    #[serde(rename = "radius_mm", serialize_with = "units::all_as_mm")]
+    pub radius: [f64; 2],
+    /// Diagonal of the part's box (m).
+    #[serde(rename = "size_mm", serialize_with = "units::as_mm")]
+    pub size: f64,
     /// Share of a closed part's area that is the face of a wall, and not its end or a lump.
     pub walls: f64,
     /// What fits.
@@ -137,7 +141,7 @@ fn of_closed(
     watch: Watch,
 ) -> Result<Advice, DesignError> {
     let whole = &solid.whole;
-    let wall_mm = [0.1, 0.5, 0.9].map(|s| 1e3 * solid.walls.thinner_than(whole, s));
+    let wall = [0.1, 0.5, 0.9].map(|s| solid.walls.thinner_than(whole, s));
     let is_face = |t: u32| solid.walls.sides[t as usize] != WallSide::Rim;
     let faces: Vec<u32> = (0..whole.triangles().len() as u32)
         .filter(|&t| is_face(t))
@@ -162,11 +166,11 @@ fn of_closed(
         format!(
             "The mesh is closed{}, with walls {} mm thick (a tenth thinner than {} mm, a tenth thicker than {} mm){} on a part {} mm across.",
             open_edges(inputs.part.as_given()),
-            digits(wall_mm[1]),
-            digits(wall_mm[0]),
-            digits(wall_mm[2]),
+            digits(units::mm(wall[1])),
+            digits(units::mm(wall[0])),
+            digits(units::mm(wall[2])),
             bent(radius),
-            digits(size_mm(&inputs.part))
+            digits(units::mm(size(&inputs.part)))
         ),
         format!(
             "As a solid at {} quality: {}.",
@@ -186,19 +190,19 @@ fn of_closed(
         words.push("What a shell and a solid would cost, and which of them fits, has not been looked at for the part as it is: ask again (Shell or solid?, F4).".into());
     }
     if let Some(why) = why {
-        let told = match cells.order {
+        let hedge = match cells.order {
             Some(_) => "",
             None => "; its figures are those of other parts",
         };
         words.push(format!(
-            "As a solid it could not be computed yet{told}: {why}."
+            "As a solid it could not be computed yet{hedge}: {why}."
         ));
     }
     Ok(Advice {
         closed: true,
-        wall_mm,
-        radius_mm: radius.map(|r| r * 1e3),
-        size_mm: size_mm(&inputs.part),
+        wall,
+        radius,
+        size: size(&inputs.part),
         walls: area / whole.area(),
         fits,
         costs,
@@ -211,13 +215,13 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     let project = &inputs.project;
     let part = inputs.part.as_given();
     let facets: Vec<u32> = (0..part.triangles().len() as u32).collect();
-    let wall = project.part.thickness_mm;
-    let radius = scope::radii(part, &facets, wall * 1e-3);
+    let wall = project.part.thickness();
+    let radius = scope::radii(part, &facets, wall);
     let asked = Workload::new(
         inputs,
         part.area(),
         radius[0],
-        PartMeasures::of_wall(wall * 1e-3, 2.0 * part.area()),
+        PartMeasures::of_wall(wall, 2.0 * part.area()),
     );
     let costs = [asked.shell(), asked.solid()];
     let [shell, cells] = &costs;
@@ -230,9 +234,9 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
         format!(
             "The mesh is open ({}): it is the middle of a wall, {} mm thick{}, on a part {} mm across.",
             plain::count(rims, "free edge"),
-            digits(wall),
+            digits(units::mm(wall)),
             bent(radius),
-            digits(size_mm(part))
+            digits(units::mm(size(part)))
         ),
         format!(
             "As a shell at {} quality: {}.",
@@ -258,9 +262,9 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     }
     Advice {
         closed: false,
-        wall_mm: [wall; 3],
-        radius_mm: radius.map(|r| r * 1e3),
-        size_mm: size_mm(part),
+        wall: [wall; 3],
+        radius,
+        size: size(part),
         walls: 1.0,
         fits,
         costs,
@@ -280,7 +284,7 @@ fn refused(part: &TriMesh, rims: usize) -> String {
 
 /// What closes an open part, where joining near vertices does.
 fn meant_closed(part: &TriMesh) -> Option<String> {
-    let mm = digits(part.closes_within()? * 1e3);
+    let mm = digits(units::mm(part.closes_within()?));
     Some(format!(
         "If it is meant to be closed: it is when vertices within {mm} mm are joined (part.weld_mm = {mm})."
     ))
@@ -301,7 +305,7 @@ fn bent(radius: [f64; 2]) -> String {
     if radius[0].is_finite() {
         format!(
             ", a tenth of them bent to less than {} mm",
-            digits(radius[0] * 1e3)
+            digits(units::mm(radius[0]))
         )
     } else {
         ", flat".into()

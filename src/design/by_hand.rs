@@ -27,7 +27,7 @@ pub fn judge_set(
     let rows = sites
         .iter()
         .filter_map(|s| reference.sites.binary_search(s).ok());
-    let as_many = Chooser::from(design.lead).set(sites.len());
+    let as_many = Chooser::from(design.chosen_by).set(sites.len());
     let own = design.evaluation.over_all(as_many);
     let set = Candidate {
         chooser: Chooser::Hand,
@@ -59,15 +59,15 @@ impl Design {
         // Sets that are as large and larger are no steps on the way to this one.
         let is_step = |sensors: usize| sensors < new.sensors;
         let selections = Arc::make_mut(&mut design.selections);
-        if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
-            led.achieved.cautions.push(
+        if let Some(own) = selections.iter_mut().find(|s| s.selector == self.chosen_by) {
+            own.achieved.cautions.push(
                 "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector. What it says of ties, gaps and exchanges is of the set that it chose.".into(),
             );
             // Its figures for that set say nothing of this one.
-            led.achieved.error_estimate = None;
-            led.sets.pop();
-            led.sets.retain(|set| is_step(set.sites.len()));
-            led.sets.push(SensorSet {
+            own.achieved.error_estimate = None;
+            own.sets.pop();
+            own.sets.retain(|set| is_step(set.sites.len()));
+            own.sets.push(SensorSet {
                 sites,
                 criterion: None,
                 criterion_mm: None,

@@ -108,8 +108,8 @@ pub fn select(
     budget: &Budget,
     watch: Watch,
 ) -> Result<Selection, DesignError> {
-    let unheard: OnFound = &|_, _, _| ();
-    select_step_by_step(inputs, simulated, reduced, kind, budget, watch, unheard)
+    let unwatched: OnFound = &|_, _, _| ();
+    select_step_by_step(inputs, simulated, reduced, kind, budget, watch, unwatched)
 }
 
 /// As [`select`], telling of every step.

@@ -11,6 +11,7 @@ use crate::gauge::Gauge;
 use crate::inference::{AsDrawn, ResponseMap};
 use crate::mesh::TriMesh;
 use crate::uncertainty::Making;
+use crate::units;
 
 /// Known touches that are proposed.
 pub const PROPOSED: usize = 12;
@@ -63,7 +64,7 @@ fn moved(gauge: &Gauge) -> [Gauge; MOVES] {
         position: gauge.moved(along, across).position,
         ..gauge.turned(degrees.to_radians())
     };
-    let (s, t) = (STEP_MM * 1e-3, STEP_DEGREES);
+    let (s, t) = (units::from_mm(STEP_MM), STEP_DEGREES);
     [
         at(0.0, 0.0, 0.0),
         at(s, 0.0, 0.0),

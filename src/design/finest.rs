@@ -116,7 +116,7 @@ impl Finest {
             touch.position += touch.normal * raised;
         }
         let sets = [Candidate {
-            chooser: design.lead.into(),
+            chooser: design.chosen_by.into(),
             rows: rows_of(&reference, chosen),
             hyper: design.chosen_row().and_then(|r| r.hyper),
         }];

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::layout::{check_shape, size_mm};
+use super::layout::{check_shape, size};
 use super::{DesignError, Inputs, LAYOUT, Meshed};
 use crate::budget::{Cancelled, ElementBudget, Watch};
 use crate::elasticity::estimate::Discretization;
@@ -21,6 +21,7 @@ use crate::mesh::winding::Winding;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
 use crate::project::{ElementKind, PartModel, Project};
+use crate::units;
 
 /// A part with its supports, ready to have elements laid on it or cells around it.
 #[derive(Clone)]
@@ -62,9 +63,9 @@ pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
     if project.part.model == PartModel::Solid {
         return Ok(Ground::Solid(Arc::new(solid_ground(inputs, watch)?)));
     }
-    if project.part.thickness_mm > size_mm(&inputs.part) {
+    if project.part.thickness() > size(&inputs.part) {
         return Err(DesignError::ThickerThanWide {
-            size_mm: size_mm(&inputs.part),
+            size: size(&inputs.part),
             thickness_mm: project.part.thickness_mm,
         });
     }
@@ -115,11 +116,11 @@ pub fn large_motion(
     /// Of the part's size.
     const LARGE: f64 = 0.1;
     let moved_mm = 100.0 * estimate.displacement_mm / estimate.displacement_percent;
-    let share = moved_mm / size_mm(part);
+    let share = units::from_mm(moved_mm) / size(part);
     (linearity.is_none() && share > LARGE).then(|| {
         format!(
             "Touches move the part by about {}, {:.0} % of its size: the model is of small deformations, and says nothing there. Check the force, the material, the unit of the mesh and what is held.",
-            plain::mm(moved_mm),
+            plain::length(units::from_mm(moved_mm)),
             100.0 * share
         )
     })
@@ -128,12 +129,12 @@ pub fn large_motion(
 /// What has to be known of a tip (its radius, m) that is larger than the part: nobody means that, but it can be computed.
 #[must_use]
 pub fn wide_tip(part: &TriMesh, tip_radius: f64) -> Option<String> {
-    let size = size_mm(part);
-    (tip_radius * 1e3 > size).then(|| {
+    let size = size(part);
+    (tip_radius > size).then(|| {
         format!(
             "A tip of {} in radius is larger than the part, which is {} across: it presses all that faces it. Check the unit of the mesh and the tip's radius (mm).",
-            plain::mm(tip_radius * 1e3),
-            plain::mm(size)
+            plain::length(tip_radius),
+            plain::length(size)
         )
     })
 }
@@ -413,7 +414,7 @@ fn even_enough(ground: &grade::ShellGround) -> Arc<TriMesh> {
     const SHARE: f64 = 0.02;
     let part = ground.part();
     let rim = part.boundary_vertices();
-    let size = size_mm(part) * 1e-3;
+    let size = size(part);
     let unfit: f64 = (0..part.triangles().len() as u32)
         .filter(|&t| is_thin(part, t) || is_blind(part, t, &rim, size))
         .map(|t| part.facet_area(t))

@@ -14,6 +14,7 @@ use crate::placement::expected_error::{
     Detail, GaugeInHand, Mistaken, MistakenPair, NUISANCES, TouchScene, blind, least_helpful,
     most_helpful, taken_for, worst_pairs,
 };
+use crate::units;
 
 /// A scene of all sites of a simulation, and how it lies on the part. Sets are numbers of sites of the dataset.
 pub struct InHand {
@@ -54,7 +55,7 @@ impl InHand {
     ) -> Result<Self, Cancelled> {
         let scene = scene(inputs, &simulated, watch)?;
         report(watch, "Laying presses on the part", 1, 2)?;
-        let presses: Vec<DVec3> = scene.presses_mm().iter().map(|p| *p / 1000.0).collect();
+        let presses: Vec<DVec3> = scene.presses_mm().into_iter().map(units::from_mm).collect();
         let places: Vec<(DVec3, DVec3)> = (presses.iter())
             .map(|&p| (p, normal_at(&simulated, p)))
             .collect();

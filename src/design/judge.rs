@@ -27,6 +27,7 @@ use crate::mesh::TriMesh;
 use crate::placement::Selection;
 use crate::regression::folds::evenly;
 use crate::uncertainty::Gluing;
+use crate::units;
 
 pub(super) use self::matched::ByMatching;
 pub use crate::placement::expected_error::BLIND;
@@ -263,7 +264,7 @@ pub(super) fn judge(
     let test_targets: Vec<[f64; 3]> = reference
         .touches
         .iter()
-        .map(|t| (t.position * 1000.0).to_array())
+        .map(|t| units::mm(t.position).to_array())
         .collect();
     evaluation::evaluate(
         &EvaluationTrial {

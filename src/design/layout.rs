@@ -14,13 +14,15 @@ use crate::mesh::reach::Finger;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{Edge, SurfacePoint, TriMesh, sample};
 use crate::project::{BadValue, PartModel, Project, SiteLattice};
+use crate::units;
 
 /// Most touches that the slopes of gluing are found for, evenly chosen: a variance needs no more.
 pub const SLOPE_TOUCHES: usize = 1300;
 
-pub(super) fn size_mm(mesh: &TriMesh) -> f64 {
+/// Diagonal of a part's box (m).
+pub(super) fn size(mesh: &TriMesh) -> f64 {
     let (lower, upper) = mesh.bounds();
-    (upper - lower).length() * 1000.0
+    (upper - lower).length()
 }
 
 /// Refuses a part that no elements can be laid on: one with a vertex far away from all the others, or so slender
@@ -35,9 +37,9 @@ pub fn check_shape(part: &TriMesh) -> Result<(), DesignError> {
     let part = part.before_halving();
     if let Some((place, distance, size)) = far_vertex(part) {
         return Err(DesignError::FarVertex {
-            place_mm: place * 1e3,
-            distance_mm: distance * 1e3,
-            size_mm: size * 1e3,
+            place,
+            distance,
+            size,
         });
     }
     let p = part.positions();
@@ -50,8 +52,8 @@ pub fn check_shape(part: &TriMesh) -> Result<(), DesignError> {
     let along: f64 = edges.iter().map(length).sum::<f64>() / size;
     if along - edges.len() as f64 > MOST_ALONG {
         return Err(DesignError::Slender {
-            longest_mm: longest * 1e3,
-            area_mm2: part.area() * 1e6,
+            longest,
+            area: part.area(),
         });
     }
     Ok(())
@@ -100,7 +102,7 @@ fn count_sites(mesh: &TriMesh, project: &Project) -> Result<usize, DesignError> 
             count: sites as usize,
             limit: MOST_SITES,
             spacing_mm: project.sites.spacing_mm,
-            size_mm: size_mm(mesh),
+            size: size(mesh),
         });
     }
     Ok(places.round() as usize)
@@ -118,12 +120,10 @@ pub fn lay_out_sites(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<SurfacePoint
         SiteLattice::Unrolled => unrolled_sites(mesh, inputs)?,
     };
     if points.is_empty() {
-        let area_mm2 = mesh.area() * 1e6;
         return Err(DesignError::NoRoom {
             spacing_mm: project.sites.spacing_mm,
-            size_mm: size_mm(mesh),
-            area_mm2,
-            fits_mm: area_mm2.sqrt(),
+            size: size(mesh),
+            area: mesh.area(),
         });
     }
     // A place with several directions is as many sites.
@@ -145,8 +145,8 @@ fn unrolled_sites(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<SurfacePoint>, 
     let high = unrolling.height.1 - unrolling.height.0;
     if (round / spacing) * (high / spacing) > MOST_PLACES {
         return Err(DesignError::WideLattice {
-            round_mm: round * 1e3,
-            high_mm: high * 1e3,
+            round,
+            high,
             spacing_mm: project.sites.spacing_mm,
         });
     }
@@ -307,7 +307,7 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
     } else {
         format!(
             "every place lies nearer to a free edge than touch.edge_margin_mm ({margin_mm} mm). Lower it, or check the unit of the mesh (the part is {:.3} mm across)",
-            size_mm(mesh)
+            units::mm(size(mesh))
         )
     };
     DesignError::NoTouches { remedy }
@@ -341,9 +341,9 @@ pub(super) fn check_memory(
     check_numbers(most, sites, touches, SaidBy::Project)
 }
 
-/// Memory of the strains and signals that a simulation holds at its largest (GB).
-pub(super) fn simulation_gb(sites: usize, touches: usize, signal: Signal) -> f64 {
-    gigabytes(simulation_numbers(sites, touches, signal))
+/// Memory of the strains and signals that a simulation holds at its largest (bytes).
+pub(super) fn simulation_bytes(sites: usize, touches: usize, signal: Signal) -> f64 {
+    bytes(simulation_numbers(sites, touches, signal))
 }
 
 /// Numbers in double precision that a simulation holds at its largest.
@@ -363,7 +363,7 @@ fn simulation_numbers(sites: usize, touches: usize, signal: Signal) -> f64 {
 }
 
 /// What a simulation will hold at its largest: about how many sites, how many touches, and the memory of
-/// its strains and signals (GB), known before anything is allocated. Of a solid about half of the surface faces
+/// its strains and signals (bytes), known before anything is allocated. Of a solid about half of the surface faces
 /// inward.
 #[must_use]
 pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
@@ -375,8 +375,8 @@ pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
     let places = (share * inputs.part.area() / (spacing * spacing)).round();
     let sites = (places * inputs.project.gauge.directions as f64) as usize;
     let touches = inputs.project.touch.count.min(budget.touches);
-    let gb = simulation_gb(sites, touches, inputs.project.gauge.signal);
-    (sites, touches, gb)
+    let bytes = simulation_bytes(sites, touches, inputs.project.gauge.signal);
+    (sites, touches, bytes)
 }
 
 /// Refuses a result of `each` numbers for every site and touch of two tables that cannot be held, before it is
@@ -395,11 +395,11 @@ fn check_numbers(
     touches: usize,
     said_by: SaidBy,
 ) -> Result<(), DesignError> {
-    let (needed_gb, limit_gb) = (gigabytes(numbers), memory::allowed_gb());
-    if needed_gb > limit_gb {
+    let (needed, limit) = (bytes(numbers), memory::allowed());
+    if needed > limit {
         return Err(DesignError::TooLarge {
-            needed_gb,
-            limit_gb,
+            needed,
+            limit,
             sites,
             touches,
             said_by,
@@ -408,8 +408,8 @@ fn check_numbers(
     Ok(())
 }
 
-fn gigabytes(numbers: f64) -> f64 {
-    numbers * size_of::<f64>() as f64 / 1e9
+fn bytes(numbers: f64) -> f64 {
+    numbers * size_of::<f64>() as f64
 }
 
 #[cfg(test)]

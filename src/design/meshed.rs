@@ -9,6 +9,7 @@ use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::{DofSet, Model, grade};
 use crate::mesh::TriMesh;
 use crate::mesh::remesh::Remeshed;
+use crate::units;
 
 /// Elements together with what they were laid on: triangles of a shell, cells or tetrahedra of a solid.
 #[derive(Clone)]
@@ -51,8 +52,10 @@ impl Meshed {
     #[must_use]
     pub fn element_mm(&self) -> f64 {
         match self {
-            Self::Shell(_, remeshed) => remeshed.mesh.mean_edge() * 1e3,
-            Self::Solid(_, fineness) => fineness.size * 1e3 / f64::from(1 << fineness.halvings),
+            Self::Shell(_, remeshed) => units::mm(remeshed.mesh.mean_edge()),
+            Self::Solid(_, fineness) => {
+                units::mm(fineness.size) / f64::from(1 << fineness.halvings)
+            }
         }
     }
 

@@ -61,8 +61,8 @@ impl<'a> Nearness<'a> {
         DesignError::OffThePart {
             what,
             number,
-            distance_mm: distance * 1000.0,
-            size_mm: self.size * 1000.0,
+            distance,
+            size: self.size,
         }
     }
 

@@ -32,7 +32,7 @@ pub struct Design {
     /// What each selector chose.
     pub selections: Arc<Vec<Selection>>,
     /// Whose sites are shown and reported.
-    pub lead: SelectorKind,
+    pub chosen_by: SelectorKind,
     /// Whether gauges of the chosen set were moved by hand.
     pub by_hand: bool,
     /// The model that judged.
@@ -102,7 +102,9 @@ impl Design {
     /// The selection that is shown and reported.
     #[must_use]
     pub fn led(&self) -> Option<&Selection> {
-        self.selections.iter().find(|s| s.selector == self.lead)
+        self.selections
+            .iter()
+            .find(|s| s.selector == self.chosen_by)
     }
 
     /// The chosen set: the project's selector at its number of gauges.
@@ -120,7 +122,7 @@ impl Design {
     /// Which of the judged sets [`Self::chosen_set`] is.
     #[must_use]
     pub fn chosen_id(&self) -> SetId {
-        Chooser::from(self.lead).set(self.chosen().len())
+        Chooser::from(self.chosen_by).set(self.chosen().len())
     }
 
     /// What the chosen set was found to do, over all touches.
@@ -139,7 +141,7 @@ impl Design {
     /// The mean error (mm) around each vertex of a mesh that lies where the part does, for the chosen set.
     #[must_use]
     pub fn error_map(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
-        let errors = self.touch_errors(self.lead, self.chosen().len())?;
+        let errors = self.touch_errors(self.chosen_by, self.chosen().len())?;
         let places: Vec<(DVec3, DVec3)> = (self.reference.touches.iter())
             .map(|t| (t.position, t.normal))
             .collect();
@@ -221,7 +223,7 @@ impl Design {
         let mut notes = self.simulated.achieved.notes.clone();
         notes.extend(self.candidates.iter().flat_map(|c| c.notes.clone()));
         for selection in self.selections.iter() {
-            if selection.selector != self.lead {
+            if selection.selector != self.chosen_by {
                 notes.extend(named(selection, &selection.achieved.cautions));
             }
             notes.extend(named(selection, &selection.achieved.notes));
@@ -318,7 +320,7 @@ pub fn run_step_by_step(
 ) -> Result<Design, DesignError> {
     let watch = hooks.watch;
     let asked = inputs.project.selection.selector;
-    let lead = *kinds
+    let chosen_by = *kinds
         .iter()
         .find(|k| **k == asked)
         .or(kinds.first())
@@ -382,7 +384,7 @@ pub fn run_step_by_step(
         feasibility,
         reduced,
         candidates,
-        lead,
+        chosen_by,
         by_hand: false,
         selections,
         reference,

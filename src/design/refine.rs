@@ -32,6 +32,7 @@ use crate::gauge::Gauge;
 use crate::placement::expected_error::{Moving, NUISANCES};
 use crate::placement::{Constraints, Selection, SensorSet};
 use crate::uncertainty::Making;
+use crate::units;
 
 const REFINING: &str = "Refining places";
 /// Most rounds.
@@ -112,7 +113,7 @@ struct Refined {
 impl Refined {
     fn words(&self, moved: usize) -> String {
         let all = || self.gauges.iter().filter(|g| g.moved);
-        let way = |g: &MovingGauge| g.now.site.gauge.position.distance(g.from.position) * 1e3;
+        let way = |g: &MovingGauge| units::mm(g.now.site.gauge.position.distance(g.from.position));
         let turn = |g: &MovingGauge| {
             let cos = g.now.site.gauge.direction.dot(g.from.direction);
             cos.abs().min(1.0).acos().to_degrees()

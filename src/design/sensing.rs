@@ -23,6 +23,7 @@ use crate::inference::{AsDrawn, Deviations};
 use crate::live::GaugeModel;
 use crate::project::{ChosenSite, LiveKeys, Project};
 use crate::uncertainty::{Gluing, Uncertainty};
+use crate::units;
 
 pub use kept::Computed;
 
@@ -231,7 +232,7 @@ impl Sensing {
             x: SignalMatrix::new(touches.len(), values.collect()),
             places_mm: touches
                 .iter()
-                .map(|t| (t.position * 1e3).to_array())
+                .map(|t| units::mm(t.position).to_array())
                 .collect(),
             forces,
         })

@@ -23,6 +23,7 @@ use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain::digits;
 use crate::project::{ElementKind, PartModel, Project};
 use crate::regression::folds::evenly;
+use crate::units;
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
 #[derive(Clone)]
@@ -194,7 +195,7 @@ fn required_off(inputs: &Inputs) -> Option<String> {
     let distances = required.map(|place| near.distance(place));
     let off: Vec<String> = (distances.enumerate())
         .filter(|&(_, distance)| distance > most)
-        .map(|(number, distance)| format!("place {number} by {} mm", digits(distance * 1e3)))
+        .map(|(number, distance)| format!("place {number} by {} mm", digits(units::mm(distance))))
         .collect();
     (!off.is_empty()).then(|| {
         format!(

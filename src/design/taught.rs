@@ -21,6 +21,7 @@ use crate::live::{GaugeModel, PipelineSettings};
 use crate::project::Project;
 use crate::regression::folds::evenly;
 use crate::uncertainty::{Gluing, HandPressing, Uncertainty};
+use crate::units;
 
 /// Readings that gauges are calibrated by, at most: what more of them say is learned as a remainder.
 const CALIBRATED_BY: usize = 600;
@@ -89,11 +90,12 @@ pub enum TeachingError {
     },
     /// The presses lie elsewhere.
     #[error(
-        "the touches lie {mm:.0} mm from the project's part (median): p_m must be metres, in the frame of its mesh"
+        "the touches lie {:.0} mm from the project's part (median): p_m must be metres, in the frame of its mesh",
+        units::mm(*apart)
     )]
     Elsewhere {
-        /// How far (mm).
-        mm: f64,
+        /// How far (m).
+        apart: f64,
     },
     /// The readings are in another unit.
     #[error(
@@ -143,7 +145,9 @@ impl<'a> PressLessons<'a> {
         let mut away = Vec::with_capacity(lessons.places_mm.len());
         let known = (lessons.places_mm.iter().zip(lessons.forces).enumerate())
             .map(|(t, (place, &force))| {
-                let (at, distance) = mesh.index().nearest(DVec3::from_array(*place) * 1e-3);
+                let (at, distance) = mesh
+                    .index()
+                    .nearest(units::from_mm(DVec3::from_array(*place)));
                 away.push(distance);
                 KnownPress {
                     at,
@@ -165,7 +169,7 @@ impl<'a> PressLessons<'a> {
         };
         let median = crate::statistics::median(away).unwrap_or(0.0);
         if median > BESIDE {
-            return Err(TeachingError::Elsewhere { mm: median * 1e3 });
+            return Err(TeachingError::Elsewhere { apart: median });
         }
         if !none {
             presses.check_unit()?;
@@ -312,8 +316,8 @@ impl Taught {
                     let reading: Vec<f64> = (0..channels).map(|c| x.row(c)[t]).collect();
                     let contact = matching.find(&reading);
                     Estimate {
-                        place_mm: (contact.position * 1e3).to_array(),
-                        radius_mm: contact.region.radius * 1e3,
+                        place_mm: units::mm(contact.position).to_array(),
+                        radius_mm: units::mm(contact.region.radius),
                         force_n: Some(contact.force),
                     }
                 },

@@ -1,20 +1,24 @@
 //! Why a part cannot be computed.
 
+use glam::DVec3;
+
 use crate::budget::Cancelled;
 use crate::plain;
-use glam::DVec3;
+use crate::units;
 
 /// Why a model cannot be built or solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElasticError {
     /// No support touches the part.
     #[error(
-        "no triangle of the part is held by a support: move a support box onto the part, or where there is none write a project that has one, as in [[support]] kind = \"clamped\", box_mm = [[x, y, z], [x, y, z]] (the part lies between {lower:.1} and {upper:.1} mm)"
+        "no triangle of the part is held by a support: move a support box onto the part, or where there is none write a project that has one, as in [[support]] kind = \"clamped\", box_mm = [[x, y, z], [x, y, z]] (the part lies between {:.1} and {:.1} mm)",
+        units::mm(*lower),
+        units::mm(*upper)
     )]
     NothingHeld {
-        /// Lower corner of the part's box (mm).
+        /// Lower corner of the part's box (m).
         lower: DVec3,
-        /// Upper corner (mm).
+        /// Upper corner (m).
         upper: DVec3,
     },
     /// Supports leave a rigid motion.
@@ -24,12 +28,13 @@ pub enum ElasticError {
     Loose,
     /// A piece of the part is not held.
     #[error(
-        "the shell is not held anywhere near vertex {vertex} at {place:.1} mm: join it to the rest or support it"
+        "the shell is not held anywhere near vertex {vertex} at {:.1} mm: join it to the rest or support it",
+        units::mm(*place)
     )]
     NotHeld {
         /// A vertex of that piece.
         vertex: usize,
-        /// Where it lies (mm).
+        /// Where it lies (m).
         place: DVec3,
     },
     /// A value is out of its range.
@@ -49,10 +54,11 @@ pub enum ElasticError {
     AllHeld,
     /// A facet has no area.
     #[error(
-        "a triangle of the mesh near {place:.1} mm has no area, so nothing can be computed on it: repair the mesh there (part.weld_mm joins what lies too close)"
+        "a triangle of the mesh near {:.1} mm has no area, so nothing can be computed on it: repair the mesh there (part.weld_mm joins what lies too close)",
+        units::mm(*place)
     )]
     NoArea {
-        /// Where it lies (mm).
+        /// Where it lies (m).
         place: DVec3,
     },
     /// A solid whose surface is not closed.
@@ -68,11 +74,12 @@ pub enum ElasticError {
     },
     /// Walls too thin for the cells to find.
     #[error(
-        "no material was found in cells of {size_mm:.3} mm: the walls are thinner than a thousandth of that. Check the unit of the mesh, or take its middle as a shell (part.model = \"shell\")"
+        "no material was found in cells of {:.3} mm: the walls are thinner than a thousandth of that. Check the unit of the mesh, or take its middle as a shell (part.model = \"shell\")",
+        units::mm(*size)
     )]
     NoMaterial {
-        /// Size of the cells (mm).
-        size_mm: f64,
+        /// Size of the cells (m).
+        size: f64,
     },
     /// No inside or no outside was found.
     #[error(
@@ -85,14 +92,14 @@ pub enum ElasticError {
     /// The factor would need more memory than may be taken.
     #[error(
         "the factored model would take {}, more than the {} that may be taken: choose a lower quality, lower budget.limits.vertices, mesh the part coarser where the file's own elements are taken, or allow more with --memory-gb",
-        plain::needed_gb(*needed_gb),
-        plain::allowed_gb(*limit_gb)
+        plain::needed(*needed),
+        plain::allowed(*limit)
     )]
     TooLarge {
-        /// How much it needs (GB).
-        needed_gb: f64,
-        /// How much may be taken (GB).
-        limit_gb: f64,
+        /// How much it needs (bytes).
+        needed: f64,
+        /// How much may be taken (bytes).
+        limit: f64,
     },
     /// The machine has no memory left.
     #[error(
@@ -127,7 +134,7 @@ fn no_solid(rims: usize, closes_within: Option<f64>) -> String {
 /// How an open mesh is closed, by joining vertices within a distance (m) where that does.
 fn closing(within: Option<f64>) -> String {
     let join = |metres: f64| {
-        let mm = plain::digits(metres * 1e3);
+        let mm = plain::digits(units::mm(metres));
         format!(
             "it closes when vertices within {mm} mm are joined (part.weld_mm = {mm}). Or close it"
         )

@@ -13,6 +13,7 @@ use super::observe::{Face, turn};
 use super::respond::{Quantity, gives_way, respond};
 use crate::budget::{Cancelled, ElementBudget, Watch};
 use crate::statistics::median;
+use crate::units;
 
 /// Change from 2h to h over the error at h. Displacements and smoothed strains converge with h² where all
 /// is smooth (3), with less near corners of supports and openings: between the two.
@@ -238,7 +239,7 @@ pub fn of(
     }
     let loads = touches.len().max(1) as f64;
     Discretization {
-        displacement_mm: (square / loads).sqrt() * 1000.0,
+        displacement_mm: units::mm((square / loads).sqrt()),
         displacement_percent: (relative / loads).sqrt() * 100.0,
         strain_percent: 100.0 * strain_apart(fine, touches, places, &strain),
         reading_percent: 100.0 * GAUGE * readings_apart(fine, touches, places, &strain),

@@ -306,7 +306,7 @@ impl ShellGround {
 
 /// An error of the canonical form, with places and numbers of vertices as the file has them.
 fn as_in_the_file(error: ElasticError, own: &Canonical) -> ElasticError {
-    let outward = |mm: DVec3| own.frame.outward(mm / 1000.0) * 1000.0;
+    let outward = |place: DVec3| own.frame.outward(place);
     match error {
         ElasticError::NothingHeld { lower, upper } => ElasticError::NothingHeld {
             lower: outward(lower),

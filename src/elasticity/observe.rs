@@ -18,6 +18,8 @@ use crate::mesh::{SurfacePoint, TriMesh};
 /// A facet turned further than this from the mean normal at a corner is across a crease, where strains
 /// are not continuous and must not be averaged (cos 30°).
 const CREASE: f64 = 0.866;
+/// What is added to a least-squares matrix, over its trace, so that it has an inverse.
+const TINY: f64 = 1e-12;
 
 /// Which face of the shell, as a height over the mid-surface in thicknesses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,7 +254,7 @@ fn curvature(mesh: &TriMesh, vertex: u32, facets: &[u32], frame: SiteFrame) -> [
             }
         }
     }
-    let least = 1e-12 * gram.trace();
+    let least = TINY * gram.trace();
     (gram + nalgebra::Matrix3::from_diagonal_element(least.max(f64::MIN_POSITIVE)))
         .cholesky()
         .map_or([0.0; 3], |c| c.solve(&right).into())

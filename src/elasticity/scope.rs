@@ -5,6 +5,7 @@ use crate::mesh::bends::bends;
 use crate::mesh::surface::Surface;
 use crate::mesh::{Edge, TriMesh};
 use crate::plain;
+use crate::units;
 
 /// Beyond this the wall is no thin shell: thickness over radius of curvature, and over width.
 const THICK_FOR_RADIUS: f64 = 0.1;
@@ -17,14 +18,13 @@ const WORTH: f64 = 0.02;
 pub fn cautions(surface: &Surface, section: &ShellSection, tip_radius: f64) -> Vec<String> {
     let mesh = &surface.mesh;
     let t = section.thickness;
-    let mm = |x: f64| x * 1000.0;
     let mut notes = Vec::new();
     let curved = tightly_curved(surface, t / THICK_FOR_RADIUS);
     if curved > WORTH {
         notes.push(format!(
             "On {:.0} % of the surface the radius of curvature is below ten wall thicknesses ({:.1} mm): thin-shell theory is several percent off there, strains of the inside face most.",
             100.0 * curved,
-            mm(t / THICK_FOR_RADIUS)
+            units::mm(t / THICK_FOR_RADIUS)
         ));
     }
     let rim: f64 = mesh.boundary_edges().map(|e| length(mesh, e)).sum();
@@ -32,8 +32,8 @@ pub fn cautions(surface: &Surface, section: &ShellSection, tip_radius: f64) -> V
     if width < t / THICK_FOR_WIDTH {
         notes.push(format!(
             "The part is made of strips about {:.1} mm wide, less than four wall thicknesses ({:.1} mm): a shell is the wrong model for bars.",
-            mm(width),
-            mm(t / THICK_FOR_WIDTH)
+            units::mm(width),
+            units::mm(t / THICK_FOR_WIDTH)
         ));
     }
     let joints: f64 = mesh
@@ -46,15 +46,15 @@ pub fn cautions(surface: &Surface, section: &ShellSection, tip_radius: f64) -> V
     if joints * 2.0 * t > WORTH * mesh.area() {
         notes.push(format!(
             "Walls meet at an angle along {:.0} mm: within about {:.1} mm of such joints the real strain is that of a solid corner and not of two shells.",
-            mm(joints),
-            mm(2.0 * t)
+            units::mm(joints),
+            units::mm(2.0 * t)
         ));
     }
     if tip_radius < t {
         notes.push(format!(
             "The tip (radius {} mm) is smaller than the wall is thick ({} mm): the dent right under it is not in a shell model.",
-            plain::digits(mm(tip_radius)),
-            plain::digits(mm(t))
+            plain::digits(units::mm(tip_radius)),
+            plain::digits(units::mm(t))
         ));
     }
     notes

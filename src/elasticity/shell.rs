@@ -257,7 +257,7 @@ fn check_areas(mesh: &TriMesh) -> Result<(), ElasticError> {
         thinness.is_nan() || thinness < FLAT
     });
     flat.map_or(Ok(()), |t| {
-        let place = mesh.corners(t)[0] * 1000.0;
+        let place = mesh.corners(t)[0];
         Err(ElasticError::NoArea { place })
     })
 }
@@ -269,10 +269,7 @@ fn check_areas(mesh: &TriMesh) -> Result<(), ElasticError> {
 pub fn check_held(mesh: &TriMesh, held: &[DofSet], firm: &[DofSet]) -> Result<(), ElasticError> {
     let (lower, upper) = mesh.bounds();
     if held.iter().all(|h| h.0 == 0) {
-        return Err(ElasticError::NothingHeld {
-            lower: lower * 1000.0,
-            upper: upper * 1000.0,
-        });
+        return Err(ElasticError::NothingHeld { lower, upper });
     }
     if firm.iter().all(|h| *h == DofSet::ALL) {
         return Err(ElasticError::AllHeld);
@@ -288,7 +285,7 @@ pub fn check_held(mesh: &TriMesh, held: &[DofSet], firm: &[DofSet]) -> Result<()
         let values = gram.symmetric_eigenvalues();
         if values.max() == 0.0 {
             let vertex = root as usize;
-            let place = mesh.positions()[vertex] * 1000.0;
+            let place = mesh.positions()[vertex];
             return Err(ElasticError::NotHeld { vertex, place });
         }
         if values.min() < 1e-10 * values.max() {
@@ -413,15 +410,15 @@ fn explain(mesh: &TriMesh, unknowns: &[u32], error: FactorError) -> ElasticError
         FactorError::OutOfMemory => ElasticError::OutOfMemory,
         FactorError::Cancelled => ElasticError::Cancelled(Cancelled),
         FactorError::TooLarge { bytes } => ElasticError::TooLarge {
-            needed_gb: bytes / 1e9,
-            limit_gb: crate::memory::allowed_gb(),
+            needed: bytes,
+            limit: crate::memory::allowed(),
         },
         FactorError::NotPositive { row } => {
             let dof = unknowns.iter().position(|&u| u as usize == row);
             let vertex = dof.unwrap_or(0) / 6;
             ElasticError::NotHeld {
                 vertex,
-                place: mesh.positions()[vertex] * 1000.0,
+                place: mesh.positions()[vertex],
             }
         }
     }

@@ -431,15 +431,15 @@ fn explain(elements: &dyn Elements, unknowns: &[u32], error: FactorError) -> Ela
         FactorError::OutOfMemory => ElasticError::OutOfMemory,
         FactorError::Cancelled => ElasticError::Cancelled(Cancelled),
         FactorError::TooLarge { bytes } => ElasticError::TooLarge {
-            needed_gb: bytes / 1e9,
-            limit_gb: memory::allowed_gb(),
+            needed: bytes,
+            limit: memory::allowed(),
         },
         FactorError::NotPositive { row } => {
             let dof = unknowns.iter().position(|&u| u as usize == row);
             let vertex = dof.unwrap_or(0) / 3;
             ElasticError::NotHeld {
                 vertex,
-                place: elements.nodes()[vertex] * 1000.0,
+                place: elements.nodes()[vertex],
             }
         }
     }

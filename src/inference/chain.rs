@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::units;
 use crate::wire::Hello;
 
 /// The electric constants between a gauge and its counts.
@@ -55,10 +56,10 @@ impl Chain {
     #[must_use]
     pub fn of_board(self, hello: &Hello) -> Self {
         Self {
-            supply_v: f64::from(hello.supply_mv) * 1e-3,
-            gain: f64::from(hello.gain_milli) * 1e-3,
+            supply_v: units::from_thousandths(hello.supply_mv),
+            gain: units::from_thousandths(hello.gain_milli),
             bits: hello.bits,
-            reference_v: f64::from(hello.reference_mv) * 1e-3,
+            reference_v: units::from_thousandths(hello.reference_mv),
             ..self
         }
     }

@@ -9,6 +9,7 @@ use super::deviation::{Deviations, Nuisances};
 use super::map::{ResponseMap, Slope};
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::{Gluing, Making, Uncertainty};
+use crate::units;
 
 /// What gauges read as drawn, and how that changes with the way they are glued.
 pub struct AsDrawn {
@@ -77,7 +78,7 @@ pub type GluingCovariance = [f64; 10];
 /// Before anything is known but how a workshop glues.
 #[must_use]
 pub fn gluing_covariance(gluing: &Gluing) -> GluingCovariance {
-    let place = (gluing.place * 1e3).powi(2) / 2.0;
+    let place = units::mm(gluing.place).powi(2) / 2.0;
     let angle = gluing.angle.to_degrees().powi(2);
     [
         gluing.gain.powi(2),
@@ -239,8 +240,8 @@ mod tests {
             let [turn, gain] = [k % 2, k / 2 % 2].map(|bit| 2.0 * f64::from(bit) - 1.0);
             let off = AsGlued {
                 gain: 1.0 + gluing.gain * gain,
-                along_mm: gluing.place * 1e3 * c,
-                across_mm: gluing.place * 1e3 * s,
+                along_mm: units::mm(gluing.place) * c,
+                across_mm: units::mm(gluing.place) * s,
                 turned_degrees: gluing.angle.to_degrees() * turn,
             };
             let built = drawn.glued(&[off, off]).at(at);

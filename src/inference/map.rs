@@ -12,6 +12,7 @@ use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::Touch;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::mesh::{SurfacePoint, TriMesh};
+use crate::units;
 
 /// Templates that are compared side by side.
 pub(super) const LANES: usize = 64;
@@ -338,7 +339,7 @@ fn blocks(values: &[f64], channels: usize) -> Vec<f32> {
     for node in 0..nodes {
         let (block, lane) = (node / LANES, node % LANES);
         for c in 0..channels {
-            let value = values[node * channels + c] * 1e6;
+            let value = units::microstrain(values[node * channels + c]);
             templates[(block * channels + c) * LANES + lane] = value as f32;
         }
     }

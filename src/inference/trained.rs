@@ -8,6 +8,7 @@ use crate::dataset::SignalMatrix;
 use crate::draw::normal;
 use crate::regression::predictor::Predictor;
 use crate::regression::{Hyper, SvrParams};
+use crate::units;
 
 /// What a machine is trained on: readings (channels × touches, strain), places (mm) and forces (N).
 pub struct LiveLessons<'a> {
@@ -87,7 +88,7 @@ impl TrainedLive {
             }
             Features::Normalized => {
                 // ln of the force that one microstrain stands for.
-                let log = |(f, n): (&f64, &f64)| (f / (n * 1e6)).ln();
+                let log = |(f, n): (&f64, &f64)| (f / units::microstrain(*n)).ln();
                 targets.push(lessons.forces.iter().zip(&norms).map(log).collect());
                 SvrParams {
                     c: hyper.c / 10.0,
@@ -118,7 +119,7 @@ impl TrainedLive {
         let out = self.predictor.predict(&sample);
         let force = match self.features {
             Features::Raw => out[3],
-            Features::Normalized => size * 1e6 * out[3].exp(),
+            Features::Normalized => units::microstrain(size) * out[3].exp(),
         };
         ([out[0], out[1], out[2]], force)
     }

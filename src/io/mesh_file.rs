@@ -360,7 +360,7 @@ fn scale(soup: &mut Soup, given: Option<Unit>, deck: bool) -> Result<f64, String
             if long > LONGEST {
                 return Err(format!(
                     "the part is {} long in the unit that line {} names ({}): its coordinates are in another one. Say which: --unit mm, cm, m or in (part.unit in a project)",
-                    plain::mm(long * 1e3),
+                    plain::length(long),
                     own.line,
                     own.length.name()
                 ));

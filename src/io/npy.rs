@@ -34,7 +34,7 @@ pub enum NpyError {
     Kind(String),
     #[error(
         "it announces {count} numbers, and at most {most:.0} are read with {} of memory. Make it smaller, or allow more with --memory-gb",
-        plain::allowed_gb(memory::allowed_gb())
+        plain::allowed(memory::allowed())
     )]
     TooLarge { count: String, most: f64 },
     #[error("it ends after {found} of its {count} numbers. Write it again")]

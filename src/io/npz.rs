@@ -124,8 +124,8 @@ impl Arrays {
                 path,
                 format!(
                     "the file has {}, and {} of memory may be used. Save fewer arrays in it, or allow more with --memory-gb",
-                    plain::needed_gb(length as f64 / 1e9),
-                    plain::allowed_gb(memory::allowed_gb())
+                    plain::needed(length as f64),
+                    plain::allowed(memory::allowed())
                 ),
             ));
         }

@@ -23,9 +23,9 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
             path,
             format!(
                 "the file has {}, and at most {} are read with {} of memory. Make it smaller, or allow more with --memory-gb",
-                plain::needed_gb(length as f64 / 1e9),
-                plain::allowed_gb(most as f64 / 1e9),
-                plain::allowed_gb(memory::allowed_gb())
+                plain::needed(length as f64),
+                plain::allowed(most as f64),
+                plain::allowed(memory::allowed())
             ),
         )
     };

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::mesh::stance::Stance;
+use crate::units;
 
 /// The end of the part that a jig is brought in at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,7 +59,7 @@ impl JigFrame {
     /// A point of the part (m) here (mm).
     #[must_use]
     pub fn here(&self, point: DVec3) -> DVec3 {
-        self.way(point - self.origin) * 1e3
+        units::mm(self.way(point - self.origin))
     }
 
     /// A direction of the part here.
@@ -70,7 +71,7 @@ impl JigFrame {
     /// A point from here (mm) in the part (m).
     #[must_use]
     pub fn out_of(&self, point: DVec3) -> DVec3 {
-        self.origin + self.turn * point * 1e-3
+        self.origin + units::from_mm(self.turn * point)
     }
 
     /// A direction from here in the part.

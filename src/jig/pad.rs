@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use super::frame::JigFrame;
 use super::sizes::Sizes;
 use super::wall::{PressedGauge, Wall};
+use crate::units;
 
 /// A pad as it lies at the wall. Its points are `out · distance + along · u + across · v + up`, with u and v over its half sizes.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,6 +124,6 @@ fn wall_at(on: &Wall, frame: &JigFrame, point: DVec3, out: DVec3) -> Option<f64>
     let start = frame.out_of(point - out * NEAR);
     let way = frame.way_out(out);
     let (_, far) = on.face.index().ray(start, way)?;
-    let off = far * 1e3 - NEAR;
+    let off = units::mm(far) - NEAR;
     (off < NEAR).then_some(off)
 }

@@ -11,6 +11,7 @@ use super::why::{LeftOutGauge, Why};
 use crate::budget::{Cancelled, Watch, report};
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
+use crate::units;
 
 /// Height of the rod's head, behind the innermost ring (mm).
 pub const HEAD: f64 = 3.0;
@@ -66,7 +67,7 @@ impl Interior {
         let middle = middle(&wall.face, wall.stance);
         let distance = |place: DVec3| {
             let at = wall.stance.coordinates(place).truncate();
-            at.distance(middle) * 1e3
+            units::mm(at.distance(middle))
         };
         let nearest = places.map(distance).fold(f64::INFINITY, f64::min);
         Self {

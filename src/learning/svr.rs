@@ -31,9 +31,11 @@ const LONG: usize = 200_000;
 /// The paper's settings (C 20, ε 1e-6, targets in metres), for outputs of size one.
 #[must_use]
 pub fn paper() -> Hyper {
+    const C_MM: f64 = 20e3;
+    const EPSILON_MM: f64 = 1e-3;
     Hyper {
-        c: 20e3 / USUAL_SPREAD_MM,
-        epsilon: 1e-3 / USUAL_SPREAD_MM,
+        c: C_MM / USUAL_SPREAD_MM,
+        epsilon: EPSILON_MM / USUAL_SPREAD_MM,
         gamma: 2e-3,
     }
 }

@@ -31,9 +31,9 @@ pub fn check_length(seconds: f64, rate_hz: u16, channels: usize, bits: u8) -> Re
     }
     Err(format!(
         "{seconds} s at {rate_hz} Hz would be a recording of {}, and at most {} are read again with {} of memory. Lower --seconds or --rate, or allow more with --memory-gb",
-        plain::needed_gb(bytes / 1e9),
-        plain::allowed_gb(most / 1e9),
-        plain::allowed_gb(memory::allowed_gb())
+        plain::needed(bytes),
+        plain::allowed(most),
+        plain::allowed(memory::allowed())
     ))
 }
 

@@ -56,9 +56,9 @@ fn whole(path: &Path) -> Result<Vec<u8>, String> {
     if size > most_bytes() {
         return Err(format!(
             "the recording has {}, and at most {} are read with {} of memory. Allow more with --memory-gb",
-            plain::needed_gb(size / 1e9),
-            plain::allowed_gb(memory::allowed_gb() / GROWTH),
-            plain::allowed_gb(memory::allowed_gb())
+            plain::needed(size),
+            plain::allowed(memory::allowed() / GROWTH),
+            plain::allowed(memory::allowed())
         ));
     }
     std::fs::read(path).map_err(unreadable)

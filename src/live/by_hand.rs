@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use super::presses::Presses;
 use super::receiver::Sample;
 use super::update::LiveUpdate;
+use crate::units;
 
 /// How long the rest before a press is read (s).
 const REST_S: f64 = 0.4;
@@ -76,7 +77,7 @@ impl HandPresses {
             return None;
         }
         if !was_felt {
-            let onset = |s: &Sample| seconds(s.time_us, sample.time_us) < ONSET_S;
+            let onset = |s: &Sample| units::seconds_between(s.time_us, sample.time_us) < ONSET_S;
             while self.rest.back().is_some_and(onset) {
                 self.rest.pop_back();
             }
@@ -96,14 +97,10 @@ impl HandPresses {
 /// Keeps the samples of the last seconds.
 fn keep(samples: &mut VecDeque<Sample>, sample: &Sample, span_s: f64) {
     samples.push_back(sample.clone());
-    let old = |s: &Sample| seconds(s.time_us, sample.time_us) > span_s;
+    let old = |s: &Sample| units::seconds_between(s.time_us, sample.time_us) > span_s;
     while samples.len() > MOST || samples.front().is_some_and(old) {
         samples.pop_front();
     }
-}
-
-fn seconds(from: u64, until: u64) -> f64 {
-    until.saturating_sub(from) as f64 * 1e-6
 }
 
 #[cfg(test)]
@@ -112,7 +109,7 @@ mod tests {
     use crate::live::presses::tests::felt;
 
     /// A hundred samples a second: strain by the number of the sample, felt from `felt` on.
-    fn heard(presses: &mut HandPresses, strain: impl Fn(u64) -> f64, count: u64) -> Vec<HandNews> {
+    fn fed(presses: &mut HandPresses, strain: impl Fn(u64) -> f64, count: u64) -> Vec<HandNews> {
         let at = |k: u64| {
             let strain = strain(k);
             let update = LiveUpdate {
@@ -143,7 +140,7 @@ mod tests {
             _ => 1e-4,
         };
         let mut presses = HandPresses::default();
-        let news = heard(&mut presses, strain, 300);
+        let news = fed(&mut presses, strain, 300);
         let [HandNews::Read, HandNews::Over(press)] = &news[..] else {
             panic!("{news:?}");
         };
@@ -167,11 +164,11 @@ mod tests {
             }
         };
         assert_eq!(
-            heard(&mut HandPresses::default(), rising, 300),
+            fed(&mut HandPresses::default(), rising, 300),
             [HandNews::Unsteady]
         );
         let at_once = |k: u64| if k < 100 { 1e-4 } else { 0.0 };
-        let news = heard(&mut HandPresses::default(), at_once, 200);
+        let news = fed(&mut HandPresses::default(), at_once, 200);
         assert_eq!(news, [HandNews::Read, HandNews::Unsteady]);
     }
 }

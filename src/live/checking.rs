@@ -4,6 +4,7 @@ use super::health::{ExpectedSignal, Health, Watcher};
 use super::tare::Rest;
 use crate::inference::Matching;
 use crate::statistics::median;
+use crate::units;
 
 /// Seconds between two looks at who felt a touch.
 const LOOK_S: f64 = 0.2;
@@ -152,7 +153,7 @@ impl Checking {
         let used = matching.used.clone();
         let count = used.iter().filter(|u| **u).count();
         self.since.take(time_us, strain);
-        let since = |at: u64| time_us.saturating_sub(at) as f64 * 1e-6;
+        let since = |at: u64| units::seconds_between(at, time_us);
         let stays = self.since.begun_us.is_some_and(|at| since(at) >= STAYS_S);
         if since(self.last_look) < LOOK_S || !stays || count < FEWEST {
             return;

@@ -2,6 +2,7 @@
 //! together.
 
 use crate::inference::{Contact, Matching, Several, SeveralTouches};
+use crate::units;
 
 /// Seconds between looks: while what is shown is what was seen, and while it is not.
 const SETTLED_S: f64 = 0.2;
@@ -105,7 +106,7 @@ impl Counting {
         } else {
             UNSETTLED_S
         };
-        let since = |last: u64| time_us.saturating_sub(last) as f64 * 1e-6;
+        let since = |last: u64| units::seconds_between(last, time_us);
         self.last_look.is_none_or(|last| since(last) >= wait)
     }
 

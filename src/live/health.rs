@@ -239,16 +239,16 @@ mod tests {
             ..EXPECTED
         };
         let hum = |k: u32| 60.0 * (f64::from(k) * 0.25 * std::f64::consts::TAU + 0.3).sin();
-        let told = |known: fn(f64) -> Option<f64>| {
+        let state = |known: fn(f64) -> Option<f64>| {
             let mut watcher = Watcher::default();
             for k in 0..600 {
                 watcher.push(2000.0 + noise(k % 997) + hum(k), known(hum(k)), &expected);
             }
             watcher.health(&expected)
         };
-        assert_eq!(told(Some), Health::Good);
-        assert_eq!(told(|_| None), Health::Good);
-        assert_eq!(told(|_| Some(0.0)), Health::Noisy);
+        assert_eq!(state(Some), Health::Good);
+        assert_eq!(state(|_| None), Health::Good);
+        assert_eq!(state(|_| Some(0.0)), Health::Noisy);
     }
 
     #[test]

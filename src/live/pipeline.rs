@@ -19,6 +19,7 @@ use super::update::{GaugeModel, Guess, LiveUpdate, PipelineSettings};
 use crate::dataset::SignalMatrix;
 use crate::inference::{Contact, Matching, SeveralTouches, TrainedLive};
 use crate::learning::TouchEstimator;
+use crate::units;
 use crate::wire::Hello;
 
 /// Samples, and seconds, between two searches everywhere: whichever is more.
@@ -362,7 +363,8 @@ impl Pipeline {
                 Under::Touches(touches)
             }
             Some(touches) if !touches.contacts.is_empty() => Under::Unsure,
-            _ if touching => Under::Strange,
+            _ if self.feeling.clearly() => Under::Strange,
+            _ if touching => Under::Unsure,
             _ => Under::Nothing {
                 at_rest: self.feeling.at_rest(),
             },
@@ -379,7 +381,7 @@ impl Pipeline {
     fn step(&mut self, time_us: u64) -> f64 {
         let step = self
             .last_time
-            .map(|last| time_us.saturating_sub(last) as f64 * 1e-6);
+            .map(|last| units::seconds_between(last, time_us));
         self.last_time = Some(time_us);
         match step {
             Some(step) if step > 0.0 && step < 1.0 => {
@@ -428,7 +430,8 @@ impl Pipeline {
     fn find_one(&mut self, time_us: u64, strain: &[f64]) -> Option<Contact> {
         let often = f64::from(SEARCH_EVERY).max(SEARCH_EVERY_S * self.rate);
         let recently = self.searched > 0 && f64::from(self.searched) < often;
-        let last = self.last.filter(|_| recently);
+        let clearly = self.feeling.clearly();
+        let last = self.last.filter(|_| recently || !clearly);
         let known = last.and_then(|last| {
             if last.narrow {
                 self.matching.track(strain, &last)
@@ -440,6 +443,11 @@ impl Pipeline {
         if let Some(contact) = known {
             self.searched += 1;
             return Some(contact);
+        }
+        if !clearly {
+            // A touch that goes is followed, and not looked for: a little above the noise fits a large force where hardly
+            // anything is felt.
+            return None;
         }
         self.searched = 1;
         let found = self.matching.find(strain);
@@ -454,7 +462,7 @@ impl Pipeline {
 
     fn guess(&self, strain: &[f64]) -> [Option<Guess>; 3] {
         let guess = |(place, force): ([f64; 3], f64)| Guess {
-            position: DVec3::from_array(place) * 1e-3,
+            position: units::from_mm(DVec3::from_array(place)),
             force,
         };
         let used = &self.matching.used;

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::update::LiveUpdate;
+use crate::units;
 
 /// Seconds that a press is read for, and that pass between two looks at it.
 const READ_S: f64 = 0.5;
@@ -57,7 +58,7 @@ impl Presses {
             return None;
         }
         let [from_us, until_us] = self.felt?;
-        if seconds(until_us, now) < OVER_S {
+        if units::seconds_between(until_us, now) < OVER_S {
             return None;
         }
         let reading = self.reading.take();
@@ -71,13 +72,13 @@ impl Presses {
 
     /// Reads it, where it has stood still for long enough.
     fn look(&mut self, now: u64, noise: &[f64], used: &[bool]) {
-        let old = |row: &(u64, Vec<f64>)| seconds(row.0, now) > READ_S;
+        let old = |row: &(u64, Vec<f64>)| units::seconds_between(row.0, now) > READ_S;
         let mut lasted = false;
         while self.rows.front().is_some_and(old) {
             self.rows.pop_front();
             lasted = true;
         }
-        if !lasted || seconds(self.looked_us, now) < LOOK_S || self.rows.len() < 4 {
+        if !lasted || units::seconds_between(self.looked_us, now) < LOOK_S || self.rows.len() < 4 {
             return;
         }
         self.looked_us = now;
@@ -95,10 +96,6 @@ impl Presses {
             self.reading = Some(all.into_iter().enumerate().map(trusted).collect());
         }
     }
-}
-
-fn seconds(from: u64, until: u64) -> f64 {
-    until.saturating_sub(from) as f64 * 1e-6
 }
 
 fn mean<'a>(rows: impl Iterator<Item = &'a (u64, Vec<f64>)> + Clone) -> Vec<f64> {

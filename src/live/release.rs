@@ -3,6 +3,7 @@
 //! they are held against it.
 
 use crate::inference::{Contact, Matching, Several};
+use crate::units;
 
 /// Of what a pull explains, twice the logarithm of the likelihood: more than that of noise.
 const CLEAR: f64 = 100.0;
@@ -47,7 +48,7 @@ impl Release {
         let explained = pull.unexplained < EXPLAINED * pull.strength;
         let better = pull.strength > CLEAR && touch.strength < pull.strength - WORSE;
         let seen = explained && better && {
-            let lately = |at: u64| (time_us.saturating_sub(at) as f64) < ASK_S * 1e6;
+            let lately = |at: u64| units::seconds_between(at, time_us) < ASK_S;
             // That it is a pull is asked until it is believed, at every sample.
             let stands = |likelier: bool| !likelier || self.looks >= LOOKS;
             if (self.asked).is_none_or(|(at, likelier)| !lately(at) || !stands(likelier)) {
@@ -74,7 +75,7 @@ impl Release {
     #[must_use]
     pub fn is_sure(&self, proved: bool) -> bool {
         let [first, last] = self.seen;
-        let lasted = last.saturating_sub(first) as f64 * 1e-6;
+        let lasted = units::seconds_between(first, last);
         self.looks >= LOOKS && (!proved || lasted >= PROVED_S)
     }
 

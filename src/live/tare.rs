@@ -3,6 +3,7 @@
 use super::health::MEDIAN_OF_NORMAL;
 use super::hum::{Hum, HumSamples};
 use crate::statistics::{mean, median};
+use crate::units;
 
 /// Rest of every channel: counts and the standard deviation of their noise.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,7 +63,7 @@ impl Taring {
 
     /// Takes a sample in; the rest when there were enough that are quiet. While they are not, the oldest part is let go.
     pub fn push(&mut self, time_us: u64, counts: &[f64]) -> Option<Rest> {
-        let since = |from: u64| time_us.abs_diff(from) as f64 * 1e-6;
+        let since = |from: u64| units::seconds(time_us.abs_diff(from));
         let begun = *self.begun_us.get_or_insert(time_us);
         self.rows.push((time_us, counts.to_vec()));
         let lasted = since(self.rows[0].0) >= self.seconds && self.rows.len() >= FEWEST;
@@ -70,7 +71,7 @@ impl Taring {
             return None;
         }
         let first = self.rows[0].0;
-        let timed = |(at, row): &(u64, Vec<f64>)| (at.abs_diff(first) as f64 * 1e-6, row.clone());
+        let timed = |(at, row): &(u64, Vec<f64>)| (units::seconds(at.abs_diff(first)), row.clone());
         let left = self.hum.begin(&self.rows.iter().map(timed).collect());
         if is_quiet(&left, self.slack) || since(begun) > PATIENCE_S + self.seconds {
             self.rows.clear();

@@ -16,6 +16,7 @@ use super::locate::SurfaceIndex;
 use super::mount::Mount;
 use super::walls::{WallSide, Walls, frame, middle};
 use crate::budget::{Cancelled, Watch, report};
+use crate::units;
 
 /// Radius of a fingertip (m).
 pub const FINGERTIP: f64 = 8e-3;
@@ -222,14 +223,14 @@ impl Reach {
                 format!(
                     ", and {:.0} % is of walls more than {THICK} times as thick as usual ({:.2} mm), taken for its frame",
                     100.0 * self.framed,
-                    1e3 * self.usual
+                    units::mm(self.usual)
                 )
             } else {
                 String::new()
             };
             words.push(format!(
                 "Of what faces outward, a fingertip of {} mm (touch.reach_mm) does not get to {:.0} %{frame}: no touches come there. Paint the outside (part.outside) where it is otherwise.",
-                1e3 * radius,
+                units::mm(radius),
                 100.0 * self.unreached
             ));
         }

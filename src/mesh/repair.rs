@@ -79,7 +79,9 @@ pub(super) struct Tear {
 /// Where an open surface is torn: its open sides would be edges if vertices within a thousandth of its middle edge were
 /// joined; nothing where none would. (The mean edge of a mesh with one vertex far away is longer than the part.)
 pub(super) fn torn(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<Tear> {
-    let within = one_digit(middle_edge(positions, triangles)? / 1000.0);
+    /// Of the middle edge.
+    const NEAR: f64 = 1e-3;
+    let within = one_digit(NEAR * middle_edge(positions, triangles)?);
     let open = open_sides(triangles);
     let vertices = ends_of(&open);
     let points: Vec<DVec3> = vertices.iter().map(|&v| positions[v as usize]).collect();
@@ -293,6 +295,11 @@ fn rims(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
 /// Longest rim that is filled without a new vertex: the work grows with the cube of it.
 const LONGEST: usize = 120;
 
+/// Twice the area of three points, over the square of their longest side, below which they lie in a line; and what such a
+/// triangle counts for instead.
+const IN_LINE: f64 = 1e-6;
+const NO_OTHER: f64 = 1e3;
+
 /// The triangulation of a closed line with the least area (G. Barequet and M. Sharir, "Filling gaps in
 /// the boundary of a polyhedron", Computer Aided Geometric Design 12 (1995)).
 fn fill(positions: &[DVec3], rim: &[u32]) -> Option<Vec<[u32; 3]>> {
@@ -306,10 +313,10 @@ fn fill(positions: &[DVec3], rim: &[u32]) -> Option<Vec<[u32; 3]>> {
         let longest = u.length_squared().max(v.length_squared());
         let twice = u.cross(v).length();
         // Three points in a line close nothing: only where there is no other way.
-        if twice > 1e-6 * longest {
+        if twice > IN_LINE * longest {
             twice
         } else {
-            1e3 * longest
+            NO_OTHER * longest
         }
     };
     let mut least = vec![vec![0.0; n]; n];

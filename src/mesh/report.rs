@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::plain;
+use crate::units;
 
 /// What was changed while a mesh was taken in; all zero for a clean one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -93,14 +94,14 @@ impl RepairReport {
         let found = found.into_iter().filter(|&(number, ..)| number > 0);
         parts.extend(found.map(|(number, one, many)| plain::either(number, one, many)));
         if let Some(within) = self.closes_within {
-            let mm = plain::digits(within * 1e3);
+            let mm = plain::digits(units::mm(within));
             parts.push(format!(
                 "{} open, and the mesh closes when vertices within {mm} mm are joined (part.weld_mm = {mm})",
                 plain::either(self.boundary_edges, "edge is", "edges are")
             ));
         }
         if let Some((within, edges)) = self.torn {
-            let mm = plain::digits(within * 1e3);
+            let mm = plain::digits(units::mm(within));
             parts.push(format!(
                 "{edges} open edges lie along each other and are not joined: the wall is torn there. Vertices within {mm} mm are joined by part.weld_mm = {mm}"
             ));

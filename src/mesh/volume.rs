@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use super::MeshError;
 use crate::plain;
+use crate::units;
 
 pub use straighten::Straightened;
 
@@ -46,24 +47,26 @@ pub type FacePlace = (u32, [DVec3; 3]);
 pub enum VolumeError {
     /// It has no volume.
     #[error(
-        "the tetrahedron has no volume (near {place:.2} mm): repair the mesh in the program that wrote it"
+        "the tetrahedron has no volume (near {:.2} mm): repair the mesh in the program that wrote it",
+        units::mm(*place)
     )]
     Flat {
         /// Which tetrahedron.
         element: usize,
-        /// Where it lies (mm).
+        /// Where it lies (m).
         place: DVec3,
     },
     /// A bent edge turns it inside out.
     #[error(
-        "an edge of the tetrahedron is bent so far that it is turned inside out there (near {place:.2} mm), and straightening that edge would move its node by {}, more than the {} that are allowed: raise part.straighten_mm, or straighten it in the mesher",
-        plain::mm(.shift * 1e3),
-        plain::mm(.most * 1e3)
+        "an edge of the tetrahedron is bent so far that it is turned inside out there (near {:.2} mm), and straightening that edge would move its node by {}, more than the {} that are allowed: raise part.straighten_mm, or straighten it in the mesher",
+        units::mm(*place),
+        plain::length(*shift),
+        plain::length(*most)
     )]
     Folded {
         /// Which tetrahedron.
         element: usize,
-        /// Where it lies (mm).
+        /// Where it lies (m).
         place: DVec3,
         /// How far the node in the middle of the edge would move, and how far it may (m).
         shift: f64,
@@ -80,12 +83,13 @@ pub enum VolumeError {
     },
     /// It lies on the wrong side of a face that it shares.
     #[error(
-        "the tetrahedron overlaps another one that it shares a face with (near {place:.2} mm): mesh the part anew"
+        "the tetrahedron overlaps another one that it shares a face with (near {:.2} mm): mesh the part anew",
+        units::mm(*place)
     )]
     Overlapping {
         /// Which tetrahedron.
         element: usize,
-        /// Where it lies (mm).
+        /// Where it lies (m).
         place: DVec3,
     },
     /// Its neighbour has another middle node on a shared edge.
@@ -202,7 +206,7 @@ impl VolumeMesh {
                 .iter()
                 .map(|&[a, b]| p[a].distance(p[b]))
                 .fold(0.0, f64::max);
-            let place = p[0] * 1e3;
+            let place = p[0];
             if volume.is_nan() || volume.abs() <= 1e-9 * longest.powi(3) {
                 return Err(VolumeError::Flat { element, place });
             }
@@ -217,7 +221,7 @@ impl VolumeMesh {
             None => Ok(self),
             Some(element) => Err(VolumeError::Overlapping {
                 element,
-                place: self.nodes[self.tetrahedra[element][0] as usize] * 1e3,
+                place: self.nodes[self.tetrahedra[element][0] as usize],
             }),
         }
     }

@@ -124,6 +124,9 @@ impl Walls {
     }
 }
 
+/// Looks begin so far off a facet, over the size of the part.
+const OFF: f64 = 1e-6;
+
 /// What one facet sees.
 struct FacetSight {
     /// Share of the open that it sees, and that the facet behind its wall sees.
@@ -143,7 +146,7 @@ impl FacetSight {
     fn of(mesh: &TriMesh, t: u32, looks: &[DVec3]) -> Self {
         let index = mesh.index();
         let (lower, upper) = mesh.bounds();
-        let off = 1e-6 * (upper - lower).length();
+        let off = OFF * (upper - lower).length();
         let normal = mesh.facet_normal(t);
         let at = mesh.corners(t).iter().sum::<DVec3>() / 3.0;
         let behind = index.ray(at - normal * off, -normal);

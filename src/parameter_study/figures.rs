@@ -6,6 +6,7 @@ use crate::elasticity::respond::gives_way;
 use crate::placement::SensorSet;
 use crate::project::PartModel;
 use crate::regression::folds::evenly;
+use crate::units;
 
 /// A number with its name; absent where there is none.
 pub type Figure = (String, Option<f64>);
@@ -34,7 +35,7 @@ pub fn figures(
     all.extend(errors(design));
     all.extend(lost(design));
     all.extend(mechanics(inputs, design)?);
-    let cm3 = volume_mm3(inputs) / 1e3;
+    let cm3 = units::cm3(volume(inputs));
     all.push(("mass_g".into(), Some(density_g_cm3 * cm3)));
     Ok(all)
 }
@@ -66,8 +67,8 @@ fn errors(design: &Design) -> Vec<Figure> {
 
 /// What is left when gauges are lost and nothing is done about it.
 fn lost(design: &Design) -> Vec<Figure> {
-    let of_lead = design.evaluation.failures_of(design.lead);
-    let rows = of_lead.iter().flat_map(|f| &f.rows);
+    let of_chosen = design.evaluation.failures_of(design.chosen_by);
+    let rows = of_chosen.iter().flat_map(|f| &f.rows);
     rows.filter(|r| r.failed > 0 && !r.retrained)
         .map(|r| (format!("lost_{}_mm", r.failed), Some(r.error_mm)))
         .collect()
@@ -90,22 +91,24 @@ fn mechanics(inputs: &Inputs, design: &Design) -> Result<Vec<Figure>, DesignErro
         .map(|s| s.rms_strain)
         .fold(0.0, f64::max);
     Ok(vec![
-        ("gives_way_mm".into(), Some(1e3 * mean)),
-        ("gives_way_most_mm".into(), Some(1e3 * most)),
+        ("gives_way_mm".into(), Some(units::mm(mean))),
+        ("gives_way_most_mm".into(), Some(units::mm(most))),
         (
             "stiffness_n_mm".into(),
-            (mean > 0.0).then_some(force / (1e3 * mean)),
+            (mean > 0.0).then_some(force / (units::mm(mean))),
         ),
-        ("largest_rms_microstrain".into(), Some(1e6 * strain)),
+        (
+            "largest_rms_microstrain".into(),
+            Some(units::microstrain(strain)),
+        ),
     ])
 }
 
 /// Of a solid what its surface encloses, of a shell its middle surface times its wall.
-fn volume_mm3(inputs: &Inputs) -> f64 {
+fn volume(inputs: &Inputs) -> f64 {
     let part = &inputs.part;
-    let m3 = match inputs.project.part.model {
+    match inputs.project.part.model {
         PartModel::Solid => part.volume_enclosed().abs(),
         PartModel::Shell => part.area() * inputs.project.part.thickness(),
-    };
-    1e9 * m3
+    }
 }

@@ -6,6 +6,7 @@ use super::{PlacementError, Pool, SensorSet};
 use crate::pca::PcaError;
 use crate::plain;
 use crate::regression::Standardizer;
+use crate::units;
 
 /// What is asked of a choice; the default asks for nothing but the count.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -392,8 +393,7 @@ impl<'a> PartialSet<'a> {
                 near += 1;
             }
         }
-        // Without what rounds in metres.
-        let spacing = (self.constraints.spacing * 1e6).round() / 1e3;
+        let spacing = plain::digits(units::mm(self.constraints.spacing));
         let reasons = [
             (near, format!("nearer than {spacing} mm to a gauge")),
             (costly, "dearer than what is left of the budget".to_owned()),

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::lanes::wide;
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
 
@@ -22,12 +23,26 @@ pub struct FloorShadow {
     pub dark: Vec<u8>,
 }
 
-/// A piece of the surface.
-struct Piece {
-    /// m.
-    at: DVec3,
-    /// Its normal times its area (m²).
-    facing: DVec3,
+/// Pieces of the surface that are summed side by side.
+const ABREAST: usize = 8;
+
+/// Some pieces, in the floor's own frame: from its middle to the right, to the front and up (m).
+#[derive(Clone)]
+struct PieceBlock {
+    at: [[f32; ABREAST]; 3],
+    /// Their normals times their areas (m²).
+    facing: [[f32; ABREAST]; 3],
+    /// From near by a piece is a disc of its area, over π (m²).
+    disc: [f32; ABREAST],
+}
+
+impl PieceBlock {
+    /// Pieces of no area.
+    const NOTHING: Self = Self {
+        at: [[0.0; ABREAST], [0.0; ABREAST], [1.0; ABREAST]],
+        facing: [[0.0; ABREAST]; 3],
+        disc: [1.0; ABREAST],
+    };
 }
 
 impl FloorShadow {
@@ -51,12 +66,11 @@ impl FloorShadow {
             + axes[1] * f64::midpoint(low[1], high[1])
             + axes[2] * (low[2] - GAP * size);
         let half = (0.5 + BEYOND) * size;
-        let pieces = pieces(mesh);
+        let pieces = pieces(mesh, middle, axes);
         let taken = |cell: usize| {
             let way = |k: usize| (2.0 * (k as f64 + 0.5) / CELLS as f64 - 1.0) * half;
             let (x, y) = (way(cell % CELLS), way(cell / CELLS));
-            let from = middle + axes[0] * x + axes[1] * y;
-            let sky: f64 = pieces.iter().map(|p| p.taken_from(from, axes[2])).sum();
+            let sky = f64::from(sky_taken(&pieces, [x as f32, y as f32]));
             // Walls count once in front and once behind; nothing is darker than dark.
             // It fades out before the map ends.
             let rim = (1.0 - (x * x + y * y) / (half * half)).max(0.0).powi(2);
@@ -71,48 +85,70 @@ impl FloorShadow {
     }
 }
 
-impl Piece {
-    /// The share of a floor's light that comes from the sky behind it (view factor from a point to a small piece).
-    fn taken_from(&self, from: DVec3, up: DVec3) -> f64 {
-        let way = self.at - from;
-        let squared = way.length_squared();
-        let above = way.dot(up).max(0.0);
-        // From near by as a disc of its area.
-        let disc = self.facing.length() / std::f64::consts::PI;
-        self.facing.dot(way).abs() * above / (std::f64::consts::PI * squared * (squared + disc))
+wide! {
+    /// The share of a floor's light that comes from the sky behind all pieces, at a place of it (view factors from a point to
+    /// small pieces).
+    fn sky_taken<'p>(pieces: &'p [PieceBlock], place: [f32; 2]) -> f32 {
+        let mut taken = [0.0; ABREAST];
+        for block in pieces {
+            for k in 0..ABREAST {
+                let way = [
+                    block.at[0][k] - place[0],
+                    block.at[1][k] - place[1],
+                    block.at[2][k],
+                ];
+                let squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+                let towards = block.facing[0][k] * way[0]
+                    + block.facing[1][k] * way[1]
+                    + block.facing[2][k] * way[2];
+                taken[k] += towards.abs() * way[2].max(0.0) / (squared * (squared + block.disc[k]));
+            }
+        }
+        taken.iter().sum::<f32>() / std::f32::consts::PI
     }
 }
 
 /// Pieces of about the same area, in the order of the triangles.
-fn pieces(mesh: &TriMesh) -> Vec<Piece> {
+fn pieces(mesh: &TriMesh, middle: DVec3, axes: [DVec3; 3]) -> Vec<PieceBlock> {
     let count = mesh.triangles().len() as u32;
     let share = mesh.area() / PIECES as f64;
-    let mut pieces = Vec::with_capacity(PIECES);
+    let (mut blocks, mut number) = (Vec::with_capacity(PIECES / ABREAST + 1), 0);
     let mut waiting = 0.0;
     for triangle in 0..count {
-        let area = mesh.facet_area(triangle);
-        waiting += area;
+        waiting += mesh.facet_area(triangle);
         if waiting < share {
             continue;
         }
-        let corners = mesh.corners(triangle);
         let parts = ((waiting / share) as usize).min(PIECES);
-        for k in 0..parts {
-            // Evenly over the triangle (M. Roberts' sequence, folded over the diagonal).
-            let [mut u, mut v] =
-                [0.754_877_666, 0.569_840_296].map(|g| (0.5 + g * k as f64).fract());
-            if u + v > 1.0 {
-                (u, v) = (1.0 - u, 1.0 - v);
+        let facing = mesh.facet_normal(triangle) * (waiting / parts as f64);
+        for at in evenly(mesh.corners(triangle), parts) {
+            let slot = number % ABREAST;
+            if slot == 0 {
+                blocks.push(PieceBlock::NOTHING);
             }
-            let [a, b, c] = corners;
-            pieces.push(Piece {
-                at: a + (b - a) * u + (c - a) * v,
-                facing: mesh.facet_normal(triangle) * (waiting / parts as f64),
-            });
+            if let Some(block) = blocks.last_mut() {
+                for (k, axis) in axes.iter().enumerate() {
+                    block.at[k][slot] = (at - middle).dot(*axis) as f32;
+                    block.facing[k][slot] = facing.dot(*axis) as f32;
+                }
+                block.disc[slot] = (facing.length() / std::f64::consts::PI) as f32;
+            }
+            number += 1;
         }
         waiting = 0.0;
     }
-    pieces
+    blocks
+}
+
+/// So many places over a triangle (M. Roberts' sequence, folded over the diagonal).
+fn evenly([a, b, c]: [DVec3; 3], parts: usize) -> impl Iterator<Item = DVec3> {
+    (0..parts).map(move |k| {
+        let [mut u, mut v] = [0.754_877_666, 0.569_840_296].map(|g| (0.5 + g * k as f64).fract());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        a + (b - a) * u + (c - a) * v
+    })
 }
 
 #[cfg(test)]
@@ -130,10 +166,10 @@ mod tests {
 
     #[test]
     fn pieces_take_what_the_view_factor_of_a_square_says() {
-        let pieces = pieces(&plate());
         for below in [0.004, 0.01, 0.02] {
-            let from = DVec3::Z * -below;
-            let taken: f64 = pieces.iter().map(|p| p.taken_from(from, DVec3::Z)).sum();
+            let middle = DVec3::Z * -below;
+            let pieces = pieces(&plate(), middle, [DVec3::X, DVec3::Y, DVec3::Z]);
+            let taken = f64::from(sky_taken(&pieces, [0.0, 0.0]));
             // Of a square of half a side a, over its middle at a distance h.
             let ratio: f64 = 0.01 / below;
             let slant = ratio / (1.0 + ratio * ratio).sqrt();

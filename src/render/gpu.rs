@@ -34,7 +34,7 @@ pub struct Frame3d {
     pub map: ColorMap,
     pub uniforms: Uniforms,
     pub shading: Shading,
-    /// Whether a hand is moving what is seen.
+    /// Whether what is seen moves: where pictures are computed by the processor, none is shaded then.
     pub hurried: bool,
     /// Red, green, blue, alpha, 0–1.
     pub background: [f64; 4],

@@ -58,7 +58,7 @@ impl Session {
         }
         let by_hand = matches!(by, PressedBy::Hand(_));
         if by_hand {
-            self.desk.bench.told_n = self.desk.bench.asked.force_n;
+            self.desk.bench.typed_n = self.desk.bench.asked.force_n;
         }
         let inbox = self.bench.take_orders(by_hand);
         let pressing = Arc::clone(&self.bench.pressing);

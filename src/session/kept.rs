@@ -33,10 +33,10 @@ impl Session {
         let (chooser, evaluation, seconds): (Chooser, Option<&Evaluation>, f64) =
             match self.results.design.as_ref().map(|d| &d.value) {
                 Some(d) if designed => {
-                    let stage = format!("select {}", d.design.lead.name());
+                    let stage = format!("select {}", d.design.chosen_by.name());
                     let took = d.design.seconds.iter().find(|s| s.stage == stage);
                     (
-                        d.design.lead.into(),
+                        d.design.chosen_by.into(),
                         Some(&d.design.evaluation),
                         took.map_or(0.0, |s| s.seconds),
                     )

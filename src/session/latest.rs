@@ -69,11 +69,13 @@ impl<Q, A> LatestDesk<Q, A> {
     }
 
     /// The latest question, this one where none is newer.
+    #[must_use]
     pub fn latest(&self, question: Q) -> Q {
         self.inbox.try_iter().last().unwrap_or(question)
     }
 
     /// The next question; nothing when there will be none.
+    #[must_use]
     pub fn wait(&self) -> Option<Q> {
         self.inbox.recv().ok()
     }

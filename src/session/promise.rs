@@ -19,7 +19,7 @@ impl Session {
     fn promise_of(&self, design: &Design, quality: Quality) -> Option<Promise> {
         let compared = self.document.state.project.selection.compare;
         let m = self.measured_at(quality)?;
-        let select = format!("select {}", design.lead.name());
+        let select = format!("select {}", design.chosen_by.name());
         if design.seconds.iter().all(|s| s.stage != select) {
             // What was there already took no time.
             return None;

@@ -89,11 +89,11 @@ impl Session {
             return;
         };
         let has = result.design.selections.iter().any(|s| s.selector == asked);
-        if result.design.lead == asked || !has {
+        if result.design.chosen_by == asked || !has {
             return;
         }
         let mut design = Design::clone(&result.design);
-        design.lead = asked;
+        design.chosen_by = asked;
         result.design = Arc::new(design);
         result.snapshot.project.selection.selector = asked;
         self.results.version += 1;

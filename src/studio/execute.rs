@@ -165,8 +165,8 @@ fn asked_of_session(command: UiCommand, ask: &mut Ask<'_>, panels: &Panels) -> O
         UiCommand::StopPresses => BenchAction::Order(BenchOrder::Stop).into(),
         UiCommand::HaltMachine => BenchAction::Order(BenchOrder::Kill).into(),
         UiCommand::TakePress => {
-            let told = ask.session.desk.bench.told_n;
-            BenchAction::Hand(HandOrder::Force(told)).into()
+            let typed = ask.session.desk.bench.typed_n;
+            BenchAction::Hand(HandOrder::Force(typed)).into()
         }
         UiCommand::SkipPress => BenchAction::Hand(HandOrder::Skip).into(),
         UiCommand::Follow => {

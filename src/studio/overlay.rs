@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, vec2};
+use egui::{Align2, Color32, FontId, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, vec2};
 use glam::{DVec3, Mat4};
 
 use super::paint::{LimbLook, label};
@@ -21,8 +21,23 @@ const EDGES: f32 = 0.6;
 /// Of a gauge's number (points).
 const MARK: f32 = 9.0;
 
+/// Whether the next picture has to come soon: the camera moves, or a hand is about to move something. Where it was the camera,
+/// one more frame is asked for, in which it stands.
+pub fn is_hurried(look: LimbLook<'_>, ui: &Ui) -> bool {
+    let camera = look.view.camera.matrix(1.0).to_cols_array();
+    let before = ui.data_mut(|d| {
+        let kept: &mut Option<[f32; 16]> = d.get_temp_mut_or_default(Id::unique("camera before"));
+        kept.replace(camera)
+    });
+    let moves = before != Some(camera);
+    if moves {
+        ui.ctx().request_repaint();
+    }
+    moves || ui.input(|i| i.pointer.any_down())
+}
+
 /// The limb itself, as the adapter draws it.
-pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
+pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop, hurried: bool) {
     let Some(built) = &look.scene.built else {
         return;
     };
@@ -51,7 +66,7 @@ pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
         uniforms,
         shading: shading(look, pixels(ui, rect), back),
-        hurried: ui.input(|i| i.pointer.any_down()),
+        hurried,
         background: back.to_array().map(|c| f64::from(c) / 255.0),
         size: pixels(ui, rect),
     };

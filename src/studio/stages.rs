@@ -207,7 +207,7 @@ fn selection_lines(session: &Session) -> Vec<String> {
         "{}: {} gauges by {}, {seconds:.1} s{}",
         d.value.quality.title(),
         d.value.design.chosen().len(),
-        d.value.design.lead.title(),
+        d.value.design.chosen_by.title(),
         if d.value.design.selections.len() > 1 {
             " for all"
         } else {

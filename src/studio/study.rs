@@ -35,7 +35,7 @@ pub fn study_tab(ask: &mut Ask<'_>, view: &mut StudyView, ui: &mut Ui) {
         );
     }
     view.follow(&study);
-    let kept: Vec<bool> = (0..study.collected.rows.len())
+    let kept: Arc<[bool]> = (0..study.collected.rows.len())
         .map(|unit| view.keeps(&study, unit))
         .collect();
     let size = ui.available_size();

@@ -14,6 +14,7 @@ use crate::dataset::Signal;
 use crate::design::{Inputs, walled};
 use crate::evaluation::EstimatorKind;
 use crate::placement::SelectorKind;
+use crate::plain;
 use crate::project::{BadValue, Project};
 
 /// A point of the trade: everything that says how much is spent.
@@ -379,7 +380,7 @@ impl TradeSetting {
         };
         let mut words = format!("{} vertices, {} touches", spent.vertices, spent.touches);
         if self.uses(Knob::Unexplained) {
-            let percent = (self.unexplained * 1000.0).round() / 10.0;
+            let percent = plain::digits(100.0 * self.unexplained);
             let _ = write!(words, ", {percent} % unexplained");
         }
         let _ = write!(words, ", {}", self.selector.title());

@@ -368,7 +368,7 @@ mod tests {
         {
             let place = inner.mesh.point(at);
             let patch = Patch::around(&inner, place, 15e-3).unwrap();
-            let off = worst(&inner, &patch, place, 12e-3) * 1e3;
+            let off = crate::units::mm(worst(&inner, &patch, place, 12e-3));
             assert!(off < 0.3, "{k}: {off} mm");
             assert!(patch.stretch < 0.02, "{k}: {}", patch.stretch);
             assert!(patch.lay(place).unwrap().length() < 0.05e-3);

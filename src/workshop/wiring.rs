@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::inner::GluedGauge;
 use crate::inference::Chain;
 use crate::uncertainty::rounding;
+use crate::units;
 
 /// Of a gauge as it is bought, and of the resistors beside it (Ω).
 pub const RESISTANCE: f64 = 350.0;
@@ -65,7 +66,7 @@ pub fn wiring(
         gauge: gauge.number,
         channel,
         pin: format!("A{channel}"),
-        microstrain: gauge.strain.map(|s| s * 1e6),
+        microstrain: gauge.strain.map(units::microstrain),
         counts: gauge.strain.map(|s| s * counts),
         cable: height + SPARE,
     };
@@ -108,7 +109,7 @@ impl Wiring {
                 chain.gain,
                 chain.bits,
                 chain.reference_v,
-                chain.counts_per_strain() * 1e-6
+                units::from_microstrain(chain.counts_per_strain())
             ),
             format!(
                 "Resistors and gauges as far off as their classes allow put a bridge {:.2} V off the converter's middle of {half:.2} V behind the amplifier{}",
@@ -141,7 +142,7 @@ impl Wiring {
         const LITTLE: f64 = 0.5;
         let gain = self.chain.gain.min(self.most_gain);
         let chain = Chain { gain, ..self.chain };
-        let count = 1e6 / chain.counts_per_strain();
+        let count = units::microstrain(1.0 / chain.counts_per_strain());
         let rounded = rounding(count);
         (rounded > LITTLE).then(|| {
             format!(
@@ -187,9 +188,9 @@ pub fn header(wiring: &Wiring, name: &str, board: u32) -> String {
         text,
         " */\n#ifndef HAPD_CONFIG_H\n#define HAPD_CONFIG_H\n\n#define HAPD_PINS {{{}}}\n#define HAPD_BOARD 0x{board:08X}\n#define HAPD_NAME \"{name}\"\n#define HAPD_REFERENCE_MV {:.0}\n#define HAPD_SUPPLY_MV {:.0}\n#define HAPD_GAIN_MILLI {:.0}\n\n#endif\n",
         pins.join(", "),
-        chain.reference_v * 1e3,
-        chain.supply_v * 1e3,
-        chain.gain * 1e3
+        units::thousandths(chain.reference_v),
+        units::thousandths(chain.supply_v),
+        units::thousandths(chain.gain)
     );
     text
 }

@@ -47,7 +47,7 @@ fn real_limbs_become_datasets() {
         let advice = design::advise(&inputs, &unwatched).unwrap();
         // The makers say 2.8 mm of the first; the others have about that.
         assert!(
-            advice.closed && (1.5..4.5).contains(&advice.wall_mm[1]),
+            advice.closed && (1.5e-3..4.5e-3).contains(&advice.wall[1]),
             "{name}: {advice:?}"
         );
         let budget = Quality::Draft.budget();

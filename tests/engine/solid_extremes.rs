@@ -177,7 +177,7 @@ fn an_open_surface_is_no_solid() {
     solid.part = Arc::new(inputs.part.thickened(2e-3));
     let advice = design::advise(&solid, &unwatched).unwrap();
     assert!(
-        advice.closed && (advice.wall_mm[1] - 2.0).abs() < 0.1,
+        advice.closed && (advice.wall[1] - 2e-3).abs() < 1e-4,
         "{advice:?}"
     );
     // Nothing held, and everything.

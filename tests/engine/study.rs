@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use hapdef::io::npz::NpzFile;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use serde_json::Value;
 
 const SITES: usize = 24;
@@ -808,14 +811,6 @@ fn expected_error_knows_noise_and_forces() {
     misused(&flags, "--forces-n needs data");
 }
 
-/// Normal deviates that are the same everywhere.
-fn deviate(k: usize) -> f64 {
-    let even = |k: f64| (k.sin() * 43_758.545_3).rem_euclid(1.0);
-    let k = k as f64;
-    (-2.0 * (1.0 - 0.999_999 * even(k + 1.0)).ln()).sqrt()
-        * (std::f64::consts::TAU * even(k + 20_000.5)).cos()
-}
-
 /// The plate pressed on a grid of 15 × 10 places, so many times each, with signals that are off by normal errors, in a
 /// file of its own; where forces are known the signals grow with them.
 fn pressed_again(folder: &Path, turns: usize, deviation: f64, forces: bool) -> String {
@@ -830,13 +825,15 @@ fn pressed_again(folder: &Path, turns: usize, deviation: f64, forces: bool) -> S
         ]
     };
     let force = |t: usize| if forces { 1.0 + (t % 7) as f64 } else { 1.0 };
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
     let x: Vec<f64> = (0..SITES * touches)
         .map(|k| {
             let (s, t) = (&sites[3 * (k / touches)..], k % touches);
             let away = [s[0] - place(t)[0], s[1] - place(t)[1]];
             let d = away[0] * away[0] + 2.0 * away[1] * away[1];
             let clean = (-d / 0.0012).exp() + 0.3 * (30.0 * away[0]).sin();
-            force(t) * (clean + deviation * deviate(k))
+            let off: f64 = rng.sample(StandardNormal);
+            force(t) * (clean + deviation * off)
         })
         .collect();
     let p: Vec<f64> = (0..touches)

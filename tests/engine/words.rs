@@ -374,8 +374,8 @@ fn an_open_solid_that_welding_closes_is_told_the_key() {
 #[test]
 fn memory_is_said_in_digits_that_are_read() {
     let said = ElasticError::TooLarge {
-        needed_gb: 8.000_3,
-        limit_gb: 8.0,
+        needed: 8_000.3e6,
+        limit: 8e9,
     };
     let said = said.to_string();
     assert!(
@@ -384,8 +384,8 @@ fn memory_is_said_in_digits_that_are_read() {
     );
     assert!(said.contains("budget.limits.vertices"), "{said}");
     let said = DesignError::TooLarge {
-        needed_gb: 3_053.123,
-        limit_gb: 0.1,
+        needed: 3_053.123e9,
+        limit: 0.1e9,
         sites: 10,
         touches: 20,
         said_by: SaidBy::Tables,

@@ -384,7 +384,7 @@ fn touches_are_messages_in_an_mcap_file() {
     let (made, said) = hapdef(here, &listen);
     assert!(made, "{said}");
     let bytes = std::fs::read(here.join("t.mcap")).unwrap();
-    let (mut samples, mut pressed, mut near) = (0, Vec::new(), 0);
+    let (mut samples, mut hardest, mut near) = (0, 0.0_f64, 0);
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
         let value: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
@@ -392,7 +392,7 @@ fn touches_are_messages_in_an_mcap_file() {
             "/touch/contacts" => samples += 1,
             "/touch/wrench" => {
                 // In the contact's frame a touch pushes against z.
-                pressed.push(value["wrench"]["force"]["z"].as_f64().unwrap());
+                hardest = hardest.min(value["wrench"]["force"]["z"].as_f64().unwrap());
             }
             "/tf" => {
                 assert_eq!(value["parent_frame_id"], "limb");
@@ -404,10 +404,8 @@ fn touches_are_messages_in_an_mcap_file() {
         }
     }
     assert!(samples > 800 && near > 200, "{samples}, {near}");
-    // As it comes and goes it is less, and of its last samples next to nothing is known.
-    pressed.sort_by(f64::total_cmp);
-    let usual = pressed[pressed.len() / 2];
-    assert!((usual + 15.0).abs() < 3.0, "{usual}");
+    // As it comes and goes it is less, and no sample of these shows more.
+    assert!((hardest + 15.0).abs() < 3.0, "{hardest}");
     let (again, said) = hapdef(here, &listen);
     assert!(!again && said.contains("not written over"), "{said}");
 }

@@ -11,6 +11,7 @@ use crate::arrows::{arrows, circles};
 use crate::layers::OUTER;
 use crate::repeats::repeats;
 use crate::source::{File, Source, attributes, attributes_within, is_test, items_in};
+use crate::units::factors;
 
 /// A file is long beyond so many lines.
 const LONG: usize = 500;
@@ -39,6 +40,7 @@ fn figures(source: &Source) -> Vec<Figure> {
     let long = long.filter(|(lines, _)| *lines > LONG);
     let bare: Vec<String> = source.files.iter().flat_map(undocumented).collect();
     let repeats = repeats(&source.files);
+    let factors: Vec<String> = source.files.iter().flat_map(factors).collect();
     let figure = |name, value, wanted, seen| Figure {
         name,
         value,
@@ -91,6 +93,7 @@ fn figures(source: &Source) -> Vec<Figure> {
                 })
                 .collect(),
         ),
+        figure("factors of units below the edge", factors.len(), 0, factors),
         figure("fields of `Studio`", studio_fields(source), 8, Vec::new()),
     ]
 }

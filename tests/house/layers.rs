@@ -17,6 +17,7 @@ const ORDER: [&[&str]; 16] = [
         "lanes",
         "memory",
         "paper",
+        "units",
         "plain",
         "statistics",
         "tally",

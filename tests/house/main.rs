@@ -7,3 +7,4 @@ mod layers;
 mod names;
 mod repeats;
 mod source;
+mod units;

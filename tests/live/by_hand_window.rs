@@ -29,7 +29,7 @@ fn tell(w: &mut Window, force: f64) {
     w.wait("the press", 30, |s| {
         s.session.bench.step() == Some(HandStep::TellForce)
     });
-    w.session_mut().desk.bench.told_n = force;
+    w.session_mut().desk.bench.typed_n = force;
     w.harness.run_ok();
 }
 

@@ -91,7 +91,7 @@ fn measured(w: &mut Window) {
     w.harness.run_ok();
     w.wait("the faces", 60, Studio::shows_field);
     let advice = w.session().advice().unwrap();
-    assert!((advice.wall_mm[1] - 3.0).abs() < 0.1, "{advice:?}");
+    assert!((advice.wall[1] - 3e-3).abs() < 1e-4, "{advice:?}");
     assert_eq!(advice.fits, PartModel::Solid);
     w.show("solid-1-faces");
 }

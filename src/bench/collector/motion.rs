@@ -1,6 +1,7 @@
 //! One move: sent, waited for, and believed only when the machine says by itself that it is there.
 
 use super::super::marlin::{Marlin, position_in};
+use crate::units;
 
 /// How far a position may be off what it was sent to (mm, degrees): reports have two digits.
 const NEAR: f64 = 0.02;
@@ -53,7 +54,7 @@ impl Motion {
             targets,
             stage: MotionStage::Axis(0),
             asked: 0,
-            late_us: now_us + SPARE_US + (longest * 1e6) as u64,
+            late_us: now_us + SPARE_US + units::microseconds(longest),
             stopped: None,
             found: None,
         };

@@ -3,6 +3,7 @@
 use super::super::machine::Pose;
 use super::super::press::SampleMean;
 use super::{Collector, CollectorNews, Doing, FAIL, FAILURES, FREE_N, Phase, RunEnd};
+use crate::units;
 
 impl Collector {
     pub(super) fn read(
@@ -42,7 +43,7 @@ impl Collector {
         };
         let number = self.plan.front().map(|(number, _)| *number);
         tell(CollectorNews::Begun(number.filter(|_| !self.check.now)));
-        let (p, n) = (planned.at * 1e3, planned.normal);
+        let (p, n) = (units::mm(planned.at), planned.normal);
         tell(CollectorNews::Note(format!(
             "{what} {:.4} {:.4} {:.4} {:.5} {:.5} {:.5}",
             p.x, p.y, p.z, n.x, n.y, n.z
@@ -172,7 +173,7 @@ impl Collector {
         if early && self.touches(&mean) {
             self.failed = Some(format!(
                 "something was met {:.1} mm before the place",
-                (self.radial - pose.radial) * 1e3
+                units::mm(self.radial - pose.radial)
             ));
             self.withdraw(now_us, out);
         } else if self.touches(&mean) {
@@ -181,13 +182,13 @@ impl Collector {
             self.forces = [None, self.machine.force(&mean, &self.rest)];
             tell(CollectorNews::Note(format!(
                 "contact {:.4}",
-                (pose.radial - self.radial) * 1e3
+                units::mm(pose.radial - self.radial)
             )));
             self.read_step(now_us, tell);
         } else if self.radial <= pose.radial - self.limits.behind + 1e-6 {
             self.failed = Some(format!(
                 "nothing was felt to {:.1} mm behind the place",
-                self.limits.behind * 1e3
+                units::mm(self.limits.behind)
             ));
             self.withdraw(now_us, out);
         } else {
@@ -197,7 +198,7 @@ impl Collector {
 
     pub(super) fn read_step(&mut self, now_us: u64, tell: &mut dyn FnMut(CollectorNews)) {
         self.phase = Phase::Read;
-        let depth = (self.contact - self.radial) * 1e3;
+        let depth = units::mm(self.contact - self.radial);
         self.read(Some(&format!("depth {depth:.4}")), now_us, tell);
     }
 

@@ -3,6 +3,7 @@
 use super::super::marlin::MachineReply;
 use super::motion::Moved;
 use super::{Collector, CollectorNews, Doing, FIRST_US, Phase, RESTARTS, SILENT_US};
+use crate::units;
 
 impl Collector {
     /// Takes in what the machine says.
@@ -88,7 +89,7 @@ impl Collector {
                 Moved::NotYet => {}
                 Moved::There => {
                     if let Some(number) = motion.found {
-                        self.radial = self.machine.radial.way(number) * 1e-3;
+                        self.radial = units::from_mm(self.machine.radial.way(number));
                     }
                     self.moves += 1;
                     self.next(now_us, out, tell);

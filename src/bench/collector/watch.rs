@@ -2,6 +2,7 @@
 
 use super::motion::Motion;
 use super::{Collector, CollectorNews, Doing, Marlin, Phase};
+use crate::units;
 
 impl Collector {
     /// Takes in a sample of the board.
@@ -82,7 +83,7 @@ impl Collector {
         Marlin::shout("M410", out);
         self.marlin.forget();
         let axis = &self.machine.radial;
-        let way = [self.came_from, self.radial].map(|r| axis.number(r * 1e3));
+        let way = [self.came_from, self.radial].map(|r| axis.number(units::mm(r)));
         let motion = Motion::stopped(axis.letter, way, &mut self.marlin, now_us, out);
         self.doing = Doing::Moving(motion);
     }

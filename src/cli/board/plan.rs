@@ -146,7 +146,7 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         };
-        let (plain, told) = (
+        let (plain, disturbed) = (
             asked(&[]),
             asked(&[
                 "--friction",
@@ -160,12 +160,12 @@ mod tests {
         let usual = inputs.project.making();
         assert_eq!(plain.making(&usual), usual);
         assert_eq!((usual.tip, usual.friction), (0.5e-3, 0.2));
-        let making = told.making(&usual);
+        let making = disturbed.making(&usual);
         assert_eq!((making.tip, making.friction), (0.0, 0.3));
         let usual = design::simulated_board::options(&inputs, 10).disturbances;
         let wander = |args: &BoardArgs| args.disturbed.disturbances(&usual).wander.unwrap();
         assert!((wander(&plain).0 - 4e-6).abs() < 1e-15 && wander(&plain).1 > 0.0);
-        assert!((wander(&told).0 - 1e-6).abs() < 1e-15 && wander(&told).1 == 5.0);
+        assert!((wander(&disturbed).0 - 1e-6).abs() < 1e-15 && wander(&disturbed).1 == 5.0);
         // Touches that push aside have more columns in the truth.
         let plan = BoardPlan::new(&plain, &inputs).unwrap();
         assert!(plan.says_more(&plain, &inputs.project.making()));

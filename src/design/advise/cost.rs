@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::super::layout::simulation_gb;
+use super::super::layout::simulation_bytes;
 use super::super::{Inputs, SLOPE_TOUCHES};
 use crate::budget::Budget;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
@@ -10,6 +10,7 @@ use crate::elasticity::solid::sizing::PartMeasures;
 use crate::elasticity::system::bytes_in_work;
 use crate::plain::digits;
 use crate::project::PartModel;
+use crate::units;
 
 /// What a model would cost at the project's quality, and how far off it would be, as on other parts.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -18,14 +19,16 @@ pub struct Cost {
     pub model: PartModel,
     /// Order that the tetrahedra of the part's file are raised to, where those are used.
     pub order: Option<usize>,
-    /// Size of its elements (mm).
-    pub element_mm: f64,
+    /// Size of its elements (m).
+    #[serde(rename = "element_mm", serialize_with = "units::as_mm")]
+    pub element: f64,
     /// Degrees of freedom.
     pub unknowns: f64,
-    /// CPU time of all its stages (s), and memory of the largest (GB).
+    /// CPU time of all its stages (s).
     pub seconds: f64,
-    /// Memory of the largest stage (GB).
-    pub memory_gb: f64,
+    /// Memory of the largest stage (bytes).
+    #[serde(rename = "memory_gb", serialize_with = "units::as_gigabytes")]
+    pub memory: f64,
     /// Error of the displacement under a touch (%) that finer elements would take away: as on other parts where that of
     /// cells could not be computed, no number where that of a part's own tetrahedra could not.
     pub error_percent: f64,
@@ -45,12 +48,13 @@ impl Cost {
     pub fn words(&self) -> String {
         /// Up to here numbers are read without words.
         const FEW: f64 = 1e4;
+        const THOUSAND: f64 = 1e3;
         let theory = if self.theory_percent > 0.0 {
             format!(" and {} % of theory", digits(self.theory_percent))
         } else {
             String::new()
         };
-        let size = digits(self.element_mm);
+        let size = digits(units::mm(self.element));
         let elements = match self.order {
             Some(order) => format!("the file's tetrahedra ({size} mm) at order {order}"),
             None => format!("elements of {size} mm"),
@@ -63,12 +67,12 @@ impl Cost {
         let unknowns = if self.unknowns < FEW {
             digits(self.unknowns)
         } else {
-            format!("{} thousand", digits(self.unknowns / 1e3))
+            format!("{} thousand", digits(self.unknowns / THOUSAND))
         };
         format!(
             "{elements}, about {unknowns} unknowns, {} s of processor time, {} GB, {error}{theory} under a touch",
             digits(self.seconds.round().max(1.0)),
-            digits(self.memory_gb.max(0.1)),
+            digits(units::gigabytes(self.memory).max(0.1)),
         )
     }
 }
@@ -81,8 +85,8 @@ pub struct Workload {
     pub touches: usize,
     /// m.
     tip: f64,
-    /// What is read at all sites of all touches (GB).
-    read_gb: f64,
+    /// What is read at all sites of all touches (bytes).
+    read: f64,
     /// Of the middles of the walls (m²).
     area: f64,
     /// Thickness of the wall and the radius it is bent to (m).
@@ -101,7 +105,7 @@ impl Workload {
         let spacing = project.sites.spacing();
         let sites = area / (spacing * spacing) * project.gauge.directions as f64;
         Self {
-            read_gb: simulation_gb(sites as usize, touches, project.gauge.signal),
+            read: simulation_bytes(sites as usize, touches, project.gauge.signal),
             touches,
             tip: inputs.project.tip().1,
             budget,
@@ -127,10 +131,10 @@ impl Workload {
         Cost {
             model: PartModel::Shell,
             order: None,
-            element_mm: size * 1e3,
+            element: size,
             unknowns,
             seconds: SHELL.seconds(elements.passes as f64 * unknowns, unknowns, self.touches),
-            memory_gb: SHELL.memory_gb(unknowns) + self.read_gb,
+            memory: SHELL.memory(unknowns) + self.read,
             error_percent: OF_TIP * (size / self.tip).powi(2),
             theory_percent: OF_THEORY * self.wall / self.radius,
         }
@@ -162,10 +166,10 @@ impl Workload {
         Cost {
             model: PartModel::Solid,
             order: None,
-            element_mm: size * 1e3,
+            element: size,
             unknowns: last,
             seconds: SOLID.seconds(sizes.iter().map(unknowns).sum(), last, self.touches),
-            memory_gb: SOLID.memory_gb(last) + self.read_gb,
+            memory: SOLID.memory(last) + self.read,
             error_percent: SolidGround::error_percent(size, self.wall.min(self.tip)),
             theory_percent: 0.0,
         }
@@ -185,10 +189,10 @@ impl Workload {
         Cost {
             model: PartModel::Solid,
             order,
-            element_mm: foreseen.size * 1e3,
+            element: foreseen.size,
             unknowns: foreseen.unknowns,
             seconds: SOLID.once + built + PRESS * loads + solved,
-            memory_gb: held / 1e9 + self.read_gb,
+            memory: held + self.read,
             error_percent: foreseen.estimate.displacement_percent,
             theory_percent: 0.0,
         }
@@ -245,7 +249,8 @@ impl CostModel {
         self.once + self.build * built * growth + self.solve * unknowns * growth * touches as f64
     }
 
-    fn memory_gb(&self, unknowns: f64) -> f64 {
-        self.entries * unknowns.powf(4.0 / 3.0) * 8.0 / 1e9
+    /// Bytes.
+    fn memory(&self, unknowns: f64) -> f64 {
+        self.entries * unknowns.powf(4.0 / 3.0) * size_of::<f64>() as f64
     }
 }

@@ -32,6 +32,7 @@ use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
 use crate::statistics::mean;
 use crate::uncertainty::{Gluing, Making, Uncertainty};
+use crate::units;
 
 /// Sites whose readings are known everywhere at the same time: those of more sets would fill the memory.
 const MOST_SITES: usize = 60;
@@ -356,7 +357,7 @@ fn reading(x: &SignalMatrix, touch: usize) -> Vec<f64> {
 fn errors_mm(matching: &Matching, x: &SignalMatrix, touches: &[Touch]) -> Vec<f64> {
     let error = |matching: &mut Matching, (t, touch): (usize, &Touch)| {
         let found = matching.find(&reading(x, t));
-        found.position.distance(touch.position) * 1e3
+        units::mm(found.position.distance(touch.position))
     };
     let touches = touches.par_iter().enumerate();
     touches.map_init(|| matching.clone(), error).collect()

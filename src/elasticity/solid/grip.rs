@@ -253,10 +253,7 @@ pub fn check(elements: &dyn Elements, grip: &Grip) -> Result<usize, ElasticError
     let nodes = elements.nodes();
     let Bounds { lower, upper } = Bounds::around(nodes.iter().copied());
     if grip.is_empty() {
-        return Err(ElasticError::NothingHeld {
-            lower: lower * 1000.0,
-            upper: upper * 1000.0,
-        });
+        return Err(ElasticError::NothingHeld { lower, upper });
     }
     if grip.nodes.iter().all(|h| h.0 & 7 == 7) {
         return Err(ElasticError::AllHeld);
@@ -289,7 +286,7 @@ pub fn check(elements: &dyn Elements, grip: &Grip) -> Result<usize, ElasticError
     for (&label, gram) in &grams {
         let values = gram.symmetric_eigenvalues();
         if values.max() == 0.0 {
-            let (vertex, place) = (label as usize, nodes[label as usize] * 1000.0);
+            let (vertex, place) = (label as usize, nodes[label as usize]);
             return Err(ElasticError::NotHeld { vertex, place });
         }
         if values.min() < 1e-10 * values.max() {

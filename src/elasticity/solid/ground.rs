@@ -33,6 +33,7 @@ use crate::mesh::room::Room;
 use crate::mesh::surface::Surface;
 use crate::mesh::walls::{WallSide, Walls};
 use crate::mesh::{SurfacePoint, TriMesh, components};
+use crate::units;
 
 /// The part and its supports as if its file had numbered it in an order of its own; tetrahedra that came with it keep
 /// their numbers.
@@ -319,8 +320,8 @@ impl SolidGround {
         if ratio > LARGE {
             notes.push(format!(
                 "The cells ({:.2} mm) are {ratio:.1} times as large as thin walls are thick ({:.2} mm): choose a higher quality, or fewer touches.",
-                fineness.size * 1e3,
-                self.wall() * 1e3
+                units::mm(fineness.size),
+                units::mm(self.wall())
             ));
         }
         let narrow = NARROW * fineness.size;
@@ -329,7 +330,7 @@ impl SolidGround {
             notes.push(format!(
                 "On {:.0} % of the surface there is less than {:.2} mm to what faces it, half a cell: there, what a gap parts moves nearly as one. Choose a higher quality, or take the body that matters alone (part.body).",
                 100.0 * near,
-                narrow * 1e3
+                units::mm(narrow)
             ));
         }
         notes

@@ -194,7 +194,7 @@ impl Immersed {
     ) -> Result<SolidModel, ElasticError> {
         if cells.count() == 0 {
             return Err(ElasticError::NoMaterial {
-                size_mm: fineness.size * 1e3,
+                size: fineness.size,
             });
         }
         let grip = self.grip(&cells, fineness.size);
@@ -405,10 +405,12 @@ fn hold_box(
     support: &Support,
     fineness: &Fineness,
 ) -> bool {
+    /// Of the cells: a node on the box's side is held.
+    const ON_THE_SIDE: f64 = 1e-9;
     let (HeldRegion::Box(held), None) = (&support.region, support.bedding) else {
         return false;
     };
-    let slack = 1e-9 * fineness.size;
+    let slack = ON_THE_SIDE * fineness.size;
     grip.hold_nodes(elements, displacements(support), |p| {
         held.contains(p, slack)
     })

@@ -200,7 +200,7 @@ fn a_machine_finds_a_part_that_is_softer() {
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
     let found = calibrate(&drawn, &known, &NOISE, &off);
-    // Part of what the part is softer by may be told as gauges that lie elsewhere: what counts is what is read.
+    // Part of what the part is softer by may be stated as gauges that lie elsewhere: what counts is what is read.
     let gain = found.glued.iter().map(|g| g.gain).sum::<f64>() / CHANNELS as f64;
     assert!((gain - 1.1).abs() < 0.03, "{:?}", found.glued);
     let fitted = drawn.calibrated(&found);
@@ -225,7 +225,7 @@ fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
         tip: Some(Arc::new(larger.mixed(&rise))),
         ..drawn()
     };
-    let told = Uncertainty {
+    let stated = Uncertainty {
         making: Making {
             tip,
             ..Making::EXACT
@@ -233,17 +233,17 @@ fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
         pressing: HandPressing::EXACT,
         ..off()
     };
-    let untold = Uncertainty {
+    let unstated = Uncertainty {
         making: Making::EXACT,
-        ..told
+        ..stated
     };
     let mut apart = [0.0; 2];
     for seed in 0..WORLDS {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let real = drawn.glued(&built(&told.gluing, &mut rng));
+        let real = drawn.glued(&built(&stated.gluing, &mut rng));
         let mut known = Vec::new();
         for _ in 0..12 {
-            let mut press = press(&real, &told.pressing, &mut rng);
+            let mut press = press(&real, &stated.pressing, &mut rng);
             let off = tip * normal(&mut rng) * FORCE;
             let felt = drawn.tip.as_ref().unwrap().at(press.at);
             for (x, felt) in press.reading.iter_mut().zip(felt) {
@@ -251,7 +251,7 @@ fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
             }
             known.push(press);
         }
-        for (apart, off) in apart.iter_mut().zip([&told, &untold]) {
+        for (apart, off) in apart.iter_mut().zip([&stated, &unstated]) {
             let fitted = drawn.calibrated(&calibrate(&drawn, &known, &NOISE, off));
             for node in 0..6 {
                 let pairs = fitted.node(node).iter().zip(real.node(node));

@@ -16,23 +16,29 @@ const NOTHING: f64 = 14.0;
 /// likely, their mean is known to a share of a template.
 const LOOKED_AT: usize = 4096;
 
+/// Single precision is in microstrain: a reading, a variance, a weight (one over a variance), and a weight times a reading.
+const READING: f64 = 1e6;
+const VARIANCE: f64 = 1e12;
+const WEIGHT: f64 = 1e-12;
+const WEIGHTED: f64 = 1e-6;
+
 impl Matching {
     /// How much better than nothing a touch at each template explains the reading.
     pub(in crate::inference) fn score(&mut self, observed: &Observation) {
-        let weights: Vec<f32> = observed.w.iter().map(|w| (w * 1e-12) as f32).collect();
+        let weights: Vec<f32> = observed.w.iter().map(|w| (w * WEIGHT) as f32).collect();
         let most = self.most_force as f32;
         // To begin with, each channel may be off for itself by what all of them feel together.
         if let Some(deviations) = &self.errors.deviations {
             let reading: Vec<f32> = observed
                 .reading()
                 .iter()
-                .map(|x| (x * 1e6) as f32)
+                .map(|x| (x * READING) as f32)
                 .collect();
             score_with_gluing(
                 [&self.map.templates, &deviations.all.templates],
                 &reading,
                 &weights,
-                (observed.drift * 1e12) as f32,
+                (observed.drift * VARIANCE) as f32,
                 most,
                 &mut self.scores,
                 &mut self.highest,
@@ -40,14 +46,14 @@ impl Matching {
             return;
         }
         let scaled: Vec<f32> = (observed.reading().iter().zip(&observed.w))
-            .map(|(x, w)| (w * x * 1e-6) as f32)
+            .map(|(x, w)| (w * x * WEIGHTED) as f32)
             .collect();
         let [taken, sum] = observed.drifted();
         score_templates(
             &self.map.templates,
             &scaled,
             &weights,
-            [(taken * 1e12) as f32, (sum * 1e-6) as f32],
+            [(taken * VARIANCE) as f32, (sum * WEIGHTED) as f32],
             most,
             &mut self.scores,
             &mut self.highest,

@@ -9,7 +9,7 @@ use super::found::{FoundDataset, FoundTouches};
 use super::plausible::{FileOrigin, longest_side};
 use crate::io::{FileError, source};
 use crate::memory;
-use crate::plain::{self, mm, quote};
+use crate::plain::{self, length, quote};
 
 /// Text may become so many times as large in memory while it is taken apart.
 const GROWTH: f64 = 16.0;
@@ -91,9 +91,9 @@ fn check_room(folder: &Path, files: &[PathBuf]) -> Result<(), FileError> {
         folder,
         format!(
             "the exports have {} together, and at most {} are read with {} of memory. Give fewer, or allow more with --memory-gb",
-            plain::needed_gb(bytes / 1e9),
-            plain::allowed_gb(memory::allowed_gb() / GROWTH),
-            plain::allowed_gb(memory::allowed_gb())
+            plain::needed(bytes),
+            plain::allowed(memory::allowed() / GROWTH),
+            plain::allowed(memory::allowed())
         ),
     ))
 }
@@ -365,7 +365,7 @@ impl Export {
             if apart > moved {
                 return broken(format!(
                     "node {node} lies {} from where it lies in the first export: they are of different meshes",
-                    mm(apart * 1e3)
+                    length(apart)
                 ));
             }
         }

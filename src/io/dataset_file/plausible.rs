@@ -7,8 +7,9 @@ use glam::DVec3;
 
 use super::FileError;
 use crate::bounds::Bounds;
-use crate::plain::mm;
+use crate::plain::length;
 use crate::statistics::median;
+use crate::units;
 
 /// Wider than any part that is pressed by hand (mm): a place in another unit, or a slip.
 const WIDEST: f64 = 20_000.0;
@@ -132,13 +133,13 @@ impl<'a> FilePlaces<'a> {
                 "{}: this one of the {} lies {} from their middle, and half of them lie within {} of it. Check the number, or take it out",
                 origin.name(number),
                 origin.what,
-                mm(distance),
-                mm(near)
+                length(units::from_mm(distance)),
+                length(units::from_mm(near))
             )),
             _ => origin.wrong(format!(
                 "the {} are spread over {}, wider than any part. {}",
                 origin.what,
-                mm(longest_side),
+                length(units::from_mm(longest_side)),
                 origin.unit()
             )),
         })
@@ -174,8 +175,8 @@ pub fn check(touches: &FilePlaces, sites: &FilePlaces) -> Result<Vec<String>, Fi
     }
     let unlike = format!(
         "the sites are spread over {} and the touches over {}, though both lie on one part",
-        mm(read),
-        mm(pressed)
+        length(units::from_mm(read)),
+        length(units::from_mm(pressed))
     );
     let odd = if read > pressed { sites } else { touches };
     if wide > WIDE {
@@ -193,7 +194,7 @@ fn in_doubt(size: f64, touches: &FilePlaces, sites: &FilePlaces) -> String {
     units.dedup();
     format!(
         "Check the unit: these places are of a part of {}. {}.",
-        mm(size),
+        length(units::from_mm(size)),
         units.join("; ")
     )
 }

@@ -127,7 +127,7 @@ fn by_force(flow: &mut Flow, design: &Design) {
 
 /// What lost gauges cost.
 fn failures(flow: &mut Flow, design: &Design) {
-    let Some(set) = design.evaluation.failures_of(design.lead) else {
+    let Some(set) = design.evaluation.failures_of(design.chosen_by) else {
         return;
     };
     let retrained = failure_ways(design.evaluation.judging.estimator()).len() > 1;

@@ -196,8 +196,8 @@ impl NodeWalk<'_> {
         }
         Err(format!(
             "would take {} with all that comes before it, and {} may be taken: decimate the mesh, or allow more with --memory-gb",
-            plain::needed_gb(needed / 1e9),
-            plain::allowed_gb(memory::allowed_gb())
+            plain::needed(needed),
+            plain::allowed(memory::allowed())
         ))
     }
 

@@ -23,7 +23,7 @@ pub fn bounded(nodes: u64, place: FilePlace) -> Result<(), String> {
     Err(format!(
         "{place}: {nodes} nodes are more than {:.0}, which is what {} of memory bear: mesh the part with larger elements, or allow more with --memory-gb",
         most.floor(),
-        plain::allowed_gb(memory::allowed_gb())
+        plain::allowed(memory::allowed())
     ))
 }
 

@@ -54,7 +54,7 @@ fn frames(messages: &[WireMessage]) -> Vec<u8> {
 }
 
 /// All that is heard there until it is over, and how it ended.
-fn heard_until_over(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
+fn received_until_over(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
     let (mut said, mut counts) = (Vec::new(), Vec::new());
     let (stop, (_commands, inbox)) = (AtomicBool::new(false), channel());
     let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |event| match event {
@@ -79,7 +79,7 @@ fn of_board(bytes: Vec<u8>) -> Vec<String> {
         // Until the other side has taken it and is gone.
         let _ = std::io::copy(&mut stream, &mut std::io::sink());
     });
-    heard_until_over(Address::Socket(address)).0
+    received_until_over(Address::Socket(address)).0
 }
 
 fn recording(path: &Path) -> Address {
@@ -93,7 +93,7 @@ fn of_recording(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.hapdrec");
     std::fs::write(&path, bytes).unwrap();
-    heard_until_over(recording(&path))
+    received_until_over(recording(&path))
 }
 
 fn log(text: &str) -> WireMessage {
@@ -153,7 +153,7 @@ fn lines_with_many_channels_are_recorded_whole() {
     let mut recorder = Recorder::create(&path).unwrap();
     recorder.sample(&sample);
     drop(recorder);
-    assert_eq!(heard_until_over(recording(&path)).1, [sample.counts]);
+    assert_eq!(received_until_over(recording(&path)).1, [sample.counts]);
     // One whose middle is lost is not taken for one of fewer channels.
     let torn = ["part 0 1,2", "line 4 5,6", "line 0 1,2,x", "part 9", "line"];
     let torn = torn.map(|text| WireMessage::Note(text.into()));
@@ -171,8 +171,8 @@ fn channels_that_do_not_come_are_told_once() {
     let greeted = of_board(frames(&[few.clone(), data.clone(), few, data]));
     let lines = of_board(b"1,2,3\n".repeat(20));
     for said in [greeted, lines] {
-        let told = |s: &&String| s.contains("gauge 4 is on channel 3, but");
-        assert_eq!(said.iter().filter(told).count(), 1, "{said:?}");
+        let names_it = |s: &&String| s.contains("gauge 4 is on channel 3, but");
+        assert_eq!(said.iter().filter(names_it).count(), 1, "{said:?}");
     }
     let enough = of_board(b"1,2,3,4\n".repeat(20));
     assert!(enough.is_empty(), "{enough:?}");

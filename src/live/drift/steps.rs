@@ -26,7 +26,7 @@ pub(super) struct Steps {
     /// Means of the stretches before, the last one first, and how much noise is left in each (1/samples).
     before: Vec<(Vec<f64>, f64)>,
     /// Sum of what was told (strain² a second), each by its weight, and these.
-    told: Vec<f64>,
+    squares: Vec<f64>,
     weight: Vec<f64>,
     /// The channels that all of it is of.
     used: Vec<bool>,
@@ -40,7 +40,7 @@ impl Steps {
             sum: vec![0.0; channels],
             samples: 0.0,
             before: Vec::new(),
-            told: vec![0.0; channels],
+            squares: vec![0.0; channels],
             weight: vec![0.0; channels],
             used: Vec::new(),
         }
@@ -48,8 +48,8 @@ impl Steps {
 
     /// q² of a channel (strain² a second).
     pub fn variance(&self, channel: usize) -> f64 {
-        let told = self.told[channel] + USUAL_COUNTS * USUAL * USUAL;
-        (told / (self.weight[channel] + USUAL_COUNTS)).max(LEAST * LEAST)
+        let squares = self.squares[channel] + USUAL_COUNTS * USUAL * USUAL;
+        (squares / (self.weight[channel] + USUAL_COUNTS)).max(LEAST * LEAST)
     }
 
     /// Takes the mean (strain) of some samples at rest, at a time, with the noise of one (strain), where each channel drifts by
@@ -112,7 +112,7 @@ impl Steps {
             let weight = (walked / (walked + noisy)).powi(2);
             if weight.is_finite() && square.is_finite() {
                 let kept = 1.0 - REMEMBERED.recip();
-                self.told[c] = kept * self.told[c] + weight * (square - noisy) / STRETCH_S;
+                self.squares[c] = kept * self.squares[c] + weight * (square - noisy) / STRETCH_S;
                 self.weight[c] = kept * self.weight[c] + weight;
             }
         }
@@ -131,7 +131,7 @@ mod tests {
 
     /// What is told of blocks of ten samples of 1 µε at 100 Hz, of channels that walk by so much and drift by 2 µε/s times 0.9 to 1.1;
     /// the first one stands still, and is off by `leaps` for a second after 30 s.
-    fn told(walk: f64, leaps: f64, is_seen: bool) -> Vec<f64> {
+    fn found(walk: f64, leaps: f64, is_seen: bool) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let (mut steps, mut rest) = (Steps::new(CHANNELS), [0.0; CHANNELS]);
         for k in 1..=1200 {
@@ -157,8 +157,8 @@ mod tests {
         (0..CHANNELS).map(|c| steps.variance(c).sqrt()).collect()
     }
 
-    fn rms(told: &[f64]) -> f64 {
-        (told.iter().map(|q| q * q).sum::<f64>() / told.len() as f64).sqrt()
+    fn rms(steps: &[f64]) -> f64 {
+        (steps.iter().map(|q| q * q).sum::<f64>() / steps.len() as f64).sqrt()
     }
 
     #[test]
@@ -168,19 +168,19 @@ mod tests {
             (0.1e-6, 0.06e-6..0.15e-6),
             (1e-6, 0.7e-6..1.3e-6),
         ] {
-            let told = told(walk, 0.0, false);
-            assert!(range.contains(&rms(&told[1..])), "{walk}: {told:?}");
+            let steps = found(walk, 0.0, false);
+            assert!(range.contains(&rms(&steps[1..])), "{walk}: {steps:?}");
             // One that stands still among others that walk.
-            assert!(told[0] < 0.06e-6 + 0.5 * walk, "{walk}: {told:?}");
+            assert!(steps[0] < 0.06e-6 + 0.5 * walk, "{walk}: {steps:?}");
         }
     }
 
     #[test]
     fn a_channel_that_was_left_out_or_leapt_once_is_no_walker() {
-        let still = told(0.0, 0.0, false);
-        let left_out = told(0.0, 1000e-6, true);
+        let still = found(0.0, 0.0, false);
+        let left_out = found(0.0, 1000e-6, true);
         assert!(left_out.iter().all(|q| *q < 0.1e-6), "{left_out:?}");
-        let leapt = told(0.0, 5e-6, false);
+        let leapt = found(0.0, 5e-6, false);
         assert!(leapt[0] < 0.5e-6, "{leapt:?}");
         assert!(
             rms(&leapt[1..]) < 1.5 * rms(&still[1..]),

@@ -11,6 +11,7 @@ use glam::{DMat3, DVec3};
 
 use super::{EDGES, VolumeError, VolumeMesh, jacobian, node_place};
 use crate::plain;
+use crate::units;
 
 /// What was straightened.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,8 +35,8 @@ impl Straightened {
                 "{} turned inside out by bent edges: {} straightened, which moved nodes by {} at most (near {:.2} mm; part.straighten_mm is the limit)",
                 plain::either(self.tetrahedra, "tetrahedron was", "tetrahedra were"),
                 plain::either(self.edges, "edge was", "edges were"),
-                plain::mm(self.largest * 1e3),
-                self.place * 1e3
+                plain::length(self.largest),
+                units::mm(self.place)
             )
         })
     }
@@ -102,7 +103,7 @@ impl VolumeMesh {
             if bend.shift > most {
                 return Err(VolumeError::Folded {
                     element,
-                    place: bend.from * 1e3,
+                    place: bend.from,
                     shift: bend.shift,
                     most,
                 });

@@ -199,7 +199,7 @@ impl<'a> Bank<'a> {
         &self,
         sites: &[usize],
         TrialMemory(rows): &mut TrialMemory,
-        mut told: impl FnMut(usize, usize, f64),
+        mut tell: impl FnMut(usize, usize, f64),
     ) {
         let scene = self.scene;
         for (tile, sites) in sites.chunks(rows.len()).enumerate() {
@@ -214,7 +214,7 @@ impl<'a> Bank<'a> {
                 }
                 for k in level.presses.clone() {
                     for (t, tried) in rows[..sites.len()].iter().enumerate() {
-                        told(first + t, k, self.error_with(k, tried));
+                        tell(first + t, k, self.error_with(k, tried));
                     }
                 }
             }

@@ -23,7 +23,7 @@ pub struct BenchDesk {
     pub board: String,
     pub printer_baud: u32,
     /// How hard the last press by hand was (N), where that is told.
-    pub told_n: f64,
+    pub typed_n: f64,
 }
 
 impl Default for BenchDesk {
@@ -40,7 +40,7 @@ impl Default for BenchDesk {
             printer: String::new(),
             board: String::new(),
             printer_baud: crate::link::BAUD,
-            told_n: BenchRequest::default().force_n,
+            typed_n: BenchRequest::default().force_n,
         }
     }
 }

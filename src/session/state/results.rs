@@ -45,7 +45,7 @@ impl DesignResult {
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignMark {
     pub(in crate::session) inputs: DesignInputs,
-    pub(in crate::session) lead: SelectorKind,
+    pub(in crate::session) chosen_by: SelectorKind,
 }
 
 /// The last results of a quality.
@@ -114,7 +114,7 @@ impl Results {
         let shown = self.design.as_ref()?;
         Some(DesignMark {
             inputs: shown.inputs.clone(),
-            lead: shown.value.design.lead,
+            chosen_by: shown.value.design.chosen_by,
         })
     }
 }

@@ -43,14 +43,14 @@ pub fn hand_form(ask: &mut Ask<'_>, ui: &mut Ui) {
         ui.add(egui::Label::new(RichText::new(more).weak()).wrap());
         ui.add_space(4.0);
         if step == HandStep::TellForce {
-            told_row(ask, ui);
+            force_row(ask, ui);
         }
         ask.button(ui, UiCommand::SkipPress);
     });
 }
 
 /// The force that a scale said, and the order that takes the press with it.
-fn told_row(ask: &mut Ask<'_>, ui: &mut Ui) {
+fn force_row(ask: &mut Ask<'_>, ui: &mut Ui) {
     let mut entered = false;
     // What is typed last: nothing is taken for a word that is no number.
     let typed = Cell::new(true);
@@ -63,14 +63,14 @@ fn told_row(ask: &mut Ask<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ask.edit_desk(|desk| {
             let name = ui.label("Force");
-            let told = DragValue::new(&mut desk.bench.told_n)
+            let force = DragValue::new(&mut desk.bench.typed_n)
                 .range(0.1..=1e4)
                 .speed(0.1)
                 .max_decimals(3)
                 .custom_parser(parsed)
                 .suffix(" N");
-            let told = ui.add(told).labelled_by(name.id);
-            entered = told.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+            let force = ui.add(force).labelled_by(name.id);
+            entered = force.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
         });
         ask.button(ui, UiCommand::TakePress);
     });

@@ -35,10 +35,10 @@ pub fn paint_live(look: LimbLook<'_>, painter: &Painter, pane: Pane) {
     paint_proposed(look, painter, pane);
     look.session
         .live
-        .look(|feed| paint_heard(look, painter, pane, feed));
+        .look(|feed| paint_received(look, painter, pane, feed));
 }
 
-fn paint_heard(look: LimbLook<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
+fn paint_received(look: LimbLook<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
     let Some(update) = &feed.update else {
         return;
     };

@@ -1,5 +1,7 @@
 //! All designs as lines over all that they have: parallel coordinates (Inselberg 1985), with a range on each axis.
 
+use std::sync::Arc;
+
 use egui::{Align2, Color32, FontId, Rect, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
 
 use super::super::theme;
@@ -19,8 +21,8 @@ const HOLD: f32 = 9.0;
 /// The lines; a drag along an axis keeps that range, a click lets all of it in again.
 pub fn parallel(
     view: &mut StudyView,
-    study: &OpenStudy,
-    kept: &[bool],
+    study: &Arc<OpenStudy>,
+    kept: &Arc<[bool]>,
     ui: &mut Ui,
 ) -> Option<usize> {
     let count = kept.iter().filter(|k| **k).count();
@@ -42,28 +44,25 @@ pub fn parallel(
         return None;
     }
     let key = key(view, pixels(ui.ctx(), inner.size()), &view.shown, ui);
-    let columns: Vec<&Column> = view.shown.iter().map(|&k| &study.columns[k]).collect();
-    let heights = |unit: usize| -> Vec<Option<f32>> {
-        columns.iter().map(|c| height(c, c.values[unit])).collect()
-    };
-    let picture = view
-        .lines
-        .of(key, ui.ctx(), |canvas| draw(canvas, study, kept, &heights));
-    show(ui.painter(), picture, inner);
+    let (of, over, columns) = (Arc::clone(study), Arc::clone(kept), view.shown.clone());
+    let draw = move |canvas: &mut PixelCanvas| draw(canvas, &of, &over, &columns);
+    if let Some(picture) = view.lines.of(key, ui.ctx(), kept.len(), draw) {
+        show(ui.painter(), picture, inner);
+    }
     if let Some(unit) = view.looked_at() {
-        let corners = path(inner.size(), &heights(unit));
+        let corners = path(inner.size(), &heights(study, &view.shown, unit));
         let places = corners.into_iter().map(|at| inner.min + at).collect();
         let line = Stroke::new(2.5, ui.visuals().strong_text_color());
         ui.painter().add(egui::Shape::line(places, line));
     }
-    let names = stagger(columns.len());
     let shown = view.shown.clone();
+    let (names, axes) = (stagger(shown.len()), shown.len());
     for ((k, column), name_at) in shown.into_iter().enumerate().zip(names) {
         axis(
             view,
             (study, column),
             inner,
-            across(inner, k, columns.len()),
+            across(inner, k, axes),
             name_at,
             ui,
         );
@@ -100,6 +99,12 @@ fn height(column: &Column, value: f64) -> Option<f32> {
     value.is_finite().then_some(share as f32)
 }
 
+/// How far up each of these columns a unit stands.
+fn heights(study: &OpenStudy, columns: &[usize], unit: usize) -> Vec<Option<f32>> {
+    let of = |&k: &usize| height(&study.columns[k], study.columns[k].values[unit]);
+    columns.iter().map(of).collect()
+}
+
 /// The corners of a line in a room of this size; what has no value is passed over.
 fn path(room: Vec2, heights: &[Option<f32>]) -> Vec<Vec2> {
     let step = room.x / (heights.len() - 1).max(1) as f32;
@@ -108,15 +113,10 @@ fn path(room: Vec2, heights: &[Option<f32>]) -> Vec<Vec2> {
     heights.iter().enumerate().filter_map(corner).collect()
 }
 
-fn draw(
-    canvas: &mut PixelCanvas,
-    study: &OpenStudy,
-    kept: &[bool],
-    heights: &dyn Fn(usize) -> Vec<Option<f32>>,
-) {
+fn draw(canvas: &mut PixelCanvas, study: &OpenStudy, kept: &[bool], columns: &[usize]) {
     let room = canvas.size() - vec2(1.0, 1.0);
     let mut line = |unit: usize, wider: i64, colour: Color32| {
-        let corners = path(room, &heights(unit));
+        let corners = path(room, &heights(study, columns, unit));
         for pair in corners.windows(2) {
             canvas.line(pair[0], pair[1], wider, colour);
         }

@@ -1,6 +1,8 @@
 //! All designs by two of their figures.
 
-use egui::{ComboBox, Pos2, Rect, Role, Ui, Vec2, WidgetInfo, vec2};
+use std::sync::Arc;
+
+use egui::{ComboBox, Pos2, Rect, Role, TextureHandle, Ui, Vec2, WidgetInfo, vec2};
 use egui_plot::{Plot, PlotImage, PlotPoint, PlotPoints, PlotResponse, Points};
 
 use super::super::theme::still;
@@ -11,33 +13,40 @@ use crate::session::{Column, OpenStudy};
 /// How near (points) the pointer must be to what it picks.
 const NEAR: f32 = 14.0;
 
-/// A range of two columns, and where units lie in it: shares from the upper left.
-struct PlotFrame<'a> {
-    columns: [&'a Column; 2],
+/// A range of two columns of a study, and where units lie in it: shares from the upper left.
+#[derive(Clone)]
+struct PlotFrame {
+    study: Arc<OpenStudy>,
+    across: [usize; 2],
     ranges: [[f64; 2]; 2],
 }
 
-impl PlotFrame<'_> {
+impl PlotFrame {
+    fn columns(&self) -> [&Column; 2] {
+        self.across.map(|k| &self.study.columns[k])
+    }
+
     fn share(&self, unit: usize) -> Option<Vec2> {
+        let columns = self.columns();
         let part = |k: usize| {
             let [low, high] = self.ranges[k];
-            ((self.columns[k].values[unit] - low) / (high - low)) as f32
+            ((columns[k].values[unit] - low) / (high - low)) as f32
         };
         let at = vec2(part(0), 1.0 - part(1));
         (at.x.is_finite() && at.y.is_finite()).then_some(at)
     }
 
     fn marks(&self, units: impl Iterator<Item = usize>) -> PlotPoints<'static> {
-        let at = |unit: usize| self.columns.map(|c| c.values[unit]);
+        let at = |unit: usize| self.columns().map(|c| c.values[unit]);
         units.map(at).collect()
     }
 
     /// Draws all designs; what is kept lies over what is not.
-    fn draw(&self, canvas: &mut PixelCanvas, study: &OpenStudy, kept: &[bool]) {
+    fn draw(&self, canvas: &mut PixelCanvas, kept: &[bool]) {
         let room = canvas.size();
         for over in [false, true] {
             for unit in (0..kept.len()).filter(|&unit| kept[unit] == over) {
-                let colour = match (over, study.collected.rows[unit].allowed) {
+                let colour = match (over, self.study.collected.rows[unit].allowed) {
                     (true, true) => KEPT,
                     (true, false) => REST,
                     (false, _) => REST.gamma_multiply(0.25),
@@ -53,8 +62,8 @@ impl PlotFrame<'_> {
 /// The plot; the unit under the pointer. A click picks it.
 pub fn scatter(
     view: &mut StudyView,
-    study: &OpenStudy,
-    kept: &[bool],
+    study: &Arc<OpenStudy>,
+    kept: &Arc<[bool]>,
     ui: &mut Ui,
 ) -> Option<usize> {
     choices(view, study, ui);
@@ -64,10 +73,11 @@ pub fn scatter(
         return None;
     };
     let frame = PlotFrame {
-        columns,
+        study: Arc::clone(study),
+        across: view.across,
         ranges: [across, up],
     };
-    let shown = plot(view, (study, &frame), kept, ui);
+    let shown = plot(view, &frame, kept, ui);
     let [x, y] = columns;
     let name = format!("All designs: {} against {}", y.name, x.name);
     shown
@@ -88,14 +98,15 @@ pub fn scatter(
 /// The designs as a picture, and over it those that stand out.
 fn plot(
     view: &mut StudyView,
-    (study, frame): (&OpenStudy, &PlotFrame<'_>),
-    kept: &[bool],
+    frame: &PlotFrame,
+    kept: &Arc<[bool]>,
     ui: &mut Ui,
 ) -> PlotResponse<()> {
     let size = ui.available_size() - vec2(0.0, 4.0);
     let key = key(view, pixels(ui.ctx(), size), &view.across, ui);
-    let draw = |canvas: &mut PixelCanvas| frame.draw(canvas, study, kept);
-    let picture = view.dots.of(key, ui.ctx(), draw).id();
+    let (of, over) = (frame.clone(), Arc::clone(kept));
+    let draw = move |canvas: &mut PixelCanvas| of.draw(canvas, &over);
+    let picture = (view.dots.of(key, ui.ctx(), kept.len(), draw)).map(TextureHandle::id);
     let [across, up] = frame.ranges;
     let middle = PlotPoint::new(
         f64::midpoint(across[0], across[1]),
@@ -105,16 +116,19 @@ fn plot(
     let strong = ui.visuals().strong_text_color();
     still(Plot::new("study"))
         .height(size.y)
-        .x_axis_label(frame.columns[0].name.clone())
-        .y_axis_label(frame.columns[1].name.clone())
+        .x_axis_label(frame.columns()[0].name.clone())
+        .y_axis_label(frame.columns()[1].name.clone())
         .show_x(false)
         .show_y(false)
         .label_formatter(|_| None)
         .show(ui, |plot| {
             plot.set_plot_bounds_x(across[0]..=across[1]);
             plot.set_plot_bounds_y(up[0]..=up[1]);
-            plot.image(PlotImage::new("designs", picture, middle, room));
-            let front = (0..kept.len()).filter(|&u| kept[u] && study.collected.rows[u].on_front);
+            if let Some(picture) = picture {
+                plot.image(PlotImage::new("designs", picture, middle, room));
+            }
+            let front =
+                (0..kept.len()).filter(|&u| kept[u] && frame.study.collected.rows[u].on_front);
             plot.points(
                 Points::new("front", frame.marks(front))
                     .color(FRONT)

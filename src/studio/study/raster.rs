@@ -1,33 +1,101 @@
-//! A picture of very many marks, drawn once and shown until it has to be another.
+//! A picture of very many marks, drawn once and shown until there is another. One of a few marks is drawn at once, one of
+//! many beside the window, which shows the one before meanwhile.
 
 use egui::{Color32, ColorImage, Context, Rect, TextureHandle, TextureOptions, Vec2};
+
+use crate::session::{Latest, LatestDesk, Wake};
 
 /// What a picture of a study is of: it is drawn anew when that changes.
 pub type RasterKey = ([usize; 2], Vec<(usize, [u64; 2])>, Vec<usize>, bool);
 
+/// Marks that are drawn within a frame.
+const AT_ONCE: usize = 5000;
+
 /// A picture, and what it is of.
 #[derive(Default)]
 pub struct Raster {
-    known: Option<(RasterKey, TextureHandle)>,
+    shown: Option<(RasterKey, TextureHandle)>,
+    /// What was last asked of the worker.
+    asked: Option<RasterKey>,
+    worker: Option<Latest<RasterOrder, (RasterKey, ColorImage)>>,
+}
+
+/// A picture that is to be drawn.
+struct RasterOrder {
+    key: RasterKey,
+    draw: Box<dyn FnOnce(&mut PixelCanvas) + Send>,
 }
 
 impl Raster {
-    /// The picture of a key: the one that is known, or a new one.
+    /// The picture of a key, of so many marks. While one of many is drawn it is the one before, nothing where there was none.
     pub fn of(
         &mut self,
         key: RasterKey,
         ctx: &Context,
-        draw: impl FnOnce(&mut PixelCanvas),
-    ) -> &TextureHandle {
-        let known = self.known.take().filter(|(known, _)| *known == key);
-        let (key, picture) = known.unwrap_or_else(|| {
-            let mut canvas = PixelCanvas::new(key.0);
-            draw(&mut canvas);
-            let picture = ctx.load_texture("study", canvas.image, TextureOptions::LINEAR);
-            (key, picture)
-        });
-        &self.known.insert((key, picture)).1
+        marks: usize,
+        draw: impl FnOnce(&mut PixelCanvas) + Send + 'static,
+    ) -> Option<&TextureHandle> {
+        self.take_drawn(ctx);
+        let draw = Box::new(draw);
+        if self.shown.as_ref().is_none_or(|(known, _)| *known != key) {
+            let order = RasterOrder { key, draw };
+            if marks <= AT_ONCE {
+                let (key, image) = order.drawn();
+                self.show(key, image, ctx);
+            } else if self.asked.as_ref() != Some(&order.key) {
+                self.ask(order, ctx);
+            }
+        }
+        self.shown.as_ref().map(|(_, picture)| picture)
     }
+
+    fn ask(&mut self, order: RasterOrder, ctx: &Context) {
+        let waker = ctx.clone();
+        let start = || {
+            let wake = Wake::new(move |wait| waker.request_repaint_after(wait));
+            Latest::start(&wake, "The picture of the designs cannot be drawn", serve)
+        };
+        self.asked = Some(order.key.clone());
+        self.worker.get_or_insert_with(start).ask(order);
+    }
+
+    fn take_drawn(&mut self, ctx: &Context) {
+        let drawn = self.worker.iter().flat_map(Latest::answers);
+        // What broke says nothing of the picture before, which stays.
+        let newest = drawn.filter_map(Result::ok).last();
+        if let Some((key, image)) = newest {
+            self.show(key, image, ctx);
+        }
+    }
+
+    fn show(&mut self, key: RasterKey, image: ColorImage, ctx: &Context) {
+        let picture = match self.shown.take() {
+            Some((_, mut picture)) => {
+                picture.set(image, TextureOptions::LINEAR);
+                picture
+            }
+            None => ctx.load_texture("study", image, TextureOptions::LINEAR),
+        };
+        self.shown = Some((key, picture));
+    }
+}
+
+impl RasterOrder {
+    fn drawn(self) -> (RasterKey, ColorImage) {
+        let mut canvas = PixelCanvas::new(self.key.0);
+        (self.draw)(&mut canvas);
+        (self.key, canvas.image)
+    }
+}
+
+/// Draws the latest that was asked for.
+fn serve(
+    order: RasterOrder,
+    desk: &LatestDesk<RasterOrder, (RasterKey, ColorImage)>,
+) -> Option<RasterOrder> {
+    let order = desk.latest(order);
+    desk.answer(Ok(order.drawn()));
+    desk.wait()
 }
 
 /// Of a rectangle in pixels of the screen.
@@ -97,6 +165,10 @@ pub fn show(painter: &egui::Painter, picture: &TextureHandle, rect: Rect) {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::{Duration, Instant};
+
     use super::*;
 
     #[test]
@@ -115,15 +187,46 @@ mod tests {
         assert_eq!(lit(10, 8), Color32::TRANSPARENT);
     }
 
+    fn key(range: u64) -> RasterKey {
+        ([4, 4], vec![(0, [range; 2])], vec![0], false)
+    }
+
     #[test]
     fn a_picture_is_drawn_once_for_what_it_is_of() {
         let ctx = Context::default();
         let mut raster = Raster::default();
-        let key = |range: u64| ([4, 4], vec![(0, [range; 2])], vec![0], false);
-        let mut drawn = 0;
+        let drawn = Arc::new(AtomicUsize::new(0));
         for range in [0, 0, 1, 1, 0] {
-            raster.of(key(range), &ctx, |_| drawn += 1);
+            let drawn = Arc::clone(&drawn);
+            let draw = move |_: &mut PixelCanvas| {
+                drawn.fetch_add(1, Ordering::Relaxed);
+            };
+            assert!(raster.of(key(range), &ctx, AT_ONCE, draw).is_some());
         }
-        assert_eq!(drawn, 3);
+        assert_eq!(drawn.load(Ordering::Relaxed), 3);
+    }
+
+    #[test]
+    fn one_of_many_marks_comes_later_and_the_one_before_stays() {
+        let ctx = Context::default();
+        let mut raster = Raster::default();
+        let (gate, open) = std::sync::mpsc::channel();
+        let draw = move |_: &mut PixelCanvas| open.recv().unwrap();
+        // Nothing yet, however often it is looked at.
+        assert!(raster.of(key(0), &ctx, AT_ONCE + 1, draw).is_none());
+        assert!(raster.of(key(0), &ctx, AT_ONCE + 1, |_| ()).is_none());
+        gate.send(()).unwrap();
+        let until = Instant::now() + Duration::from_secs(20);
+        let shown = |raster: &mut Raster, of: u64| {
+            raster.of(key(of), &ctx, AT_ONCE + 1, |_| ());
+            raster.shown.as_ref().map(|(key, _)| key.clone())
+        };
+        while shown(&mut raster, 0) != Some(key(0)) {
+            assert!(Instant::now() < until);
+        }
+        assert!(raster.of(key(1), &ctx, AT_ONCE + 1, |_| ()).is_some());
+        while shown(&mut raster, 1) != Some(key(1)) {
+            assert!(Instant::now() < until);
+        }
     }
 }

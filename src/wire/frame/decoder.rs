@@ -216,10 +216,10 @@ mod tests {
         for sequence in 0..40 {
             encode(&data, 40_000 + sequence, 0, 12, &mut bytes);
         }
-        let heard = events(&bytes)
+        let decoded = events(&bytes)
             .into_iter()
             .filter(|e| matches!(e, Decoded::Message { .. }));
-        assert!(heard.count() > 25);
+        assert!(decoded.count() > 25);
     }
 
     #[test]

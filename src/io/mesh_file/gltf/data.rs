@@ -42,7 +42,7 @@ impl Buffers {
             if total as f64 > memory::allowed() / 4.0 {
                 return Err(format!(
                     "the buffers of the glTF file have more than a quarter of the {} that may be taken: make them smaller, or allow more with --memory-gb",
-                    plain::allowed_gb(memory::allowed_gb())
+                    plain::allowed(memory::allowed())
                 ));
             }
             loaded.push(bytes);

@@ -18,14 +18,14 @@ fn noise(k: u32, c: usize) -> f64 {
 
 /// What a walk is told: a channel's drift (strain a second) from some time (s) on; which channels are read, and whether
 /// a touch hides the others from that time on.
-struct Told {
+struct Simulated {
     speeds: [f64; N],
     begins_s: f64,
     hidden: usize,
     from_s: f64,
 }
 
-impl Told {
+impl Simulated {
     fn drifted(&self, c: usize, now_s: f64) -> f64 {
         self.speeds[c] * (now_s - self.begins_s).max(0.0)
     }
@@ -56,7 +56,7 @@ impl Told {
     }
 }
 
-const AT_REST: Told = Told {
+const AT_REST: Simulated = Simulated {
     speeds: [2e-6; N],
     begins_s: 0.0,
     hidden: 0,
@@ -74,16 +74,16 @@ fn uneven(by: f64) -> [f64; N] {
 #[test]
 fn what_is_hidden_drifts_as_the_others_do() {
     for (by, begins_s, most) in [(0.0, 0.0, 4e-6), (0.1, 0.0, 40e-6), (0.2, 20.0, 80e-6)] {
-        let told = Told {
+        let simulated = Simulated {
             speeds: uneven(by),
             begins_s,
             hidden: 3,
             from_s: 3.0,
         };
-        let walk = told.followed(120.0);
+        let walk = simulated.followed(120.0);
         let covariance = walk.rest_covariance(0.0, true);
         for (c, rest) in walk.rest(0.0).take(3).enumerate() {
-            let off = (rest - told.drifted(c, 120.0)).abs();
+            let off = (rest - simulated.drifted(c, 120.0)).abs();
             let deviation = covariance[(c, c)].sqrt();
             assert!(
                 deviation < most && off < 3.5 * deviation,
@@ -98,12 +98,12 @@ fn what_is_hidden_drifts_as_the_others_do() {
 fn channels_that_drift_unevenly_are_told_and_stay_so() {
     for by in [0.0, 0.2] {
         for seconds in [20.0, 180.0] {
-            let told = Told {
+            let simulated = Simulated {
                 speeds: uneven(by),
                 ..AT_REST
             };
-            let walk = told.followed(seconds);
-            for (speed, found) in told.speeds.iter().zip(walk.speeds()) {
+            let walk = simulated.followed(seconds);
+            for (speed, found) in simulated.speeds.iter().zip(walk.speeds()) {
                 assert!(
                     (found - speed).abs() < 0.15e-6,
                     "{by} {seconds}: {found} of {speed}"
@@ -116,7 +116,7 @@ fn channels_that_drift_unevenly_are_told_and_stay_so() {
             );
         }
     }
-    let still = Told {
+    let still = Simulated {
         speeds: [0.0; N],
         ..AT_REST
     }
@@ -128,7 +128,7 @@ fn channels_that_drift_unevenly_are_told_and_stay_so() {
 
 #[test]
 fn what_comes_at_once_is_no_drift() {
-    let mut walk = Told {
+    let mut walk = Simulated {
         speeds: [0.0; N],
         ..AT_REST
     }

@@ -245,9 +245,9 @@ fn presses_side_by_side_are_what_one_filter_says() {
                     tell(&mut one, turn, site);
                 }
                 assert!((bank.truth.cost(press) - one.cost).abs() < 1e-9 * one.cost.abs().max(1.0));
-                let told = tell(&mut one, set.len(), 2);
+                let found = tell(&mut one, set.len(), 2);
                 let near = |a: f32, b: f64| (f64::from(a) - b).abs() < 1e-6 * b.abs().max(1.0);
-                assert!(near(read.readings[press], told), "{told}");
+                assert!(near(read.readings[press], found), "{found}");
                 assert!(near(read.costs[press], one.cost), "{}", one.cost);
                 let mut off = [(0, 0), (0, 1), (1, 1)].map(|at| one.covariance[at]);
                 for (k, unknown) in scene.unknowns.iter().enumerate() {
