@@ -422,7 +422,7 @@ impl Studio {
     /// A gesture has ended when nothing is held down any more: what it changed is one step of undo.
     fn settle(&mut self, ctx: &Context) {
         // Another selector and its gauges are one step of undo.
-        self.session.follow_lead();
+        self.session.follow_selector();
         self.follow();
         let focused = ctx.memory(egui::Memory::focused);
         let typing = ctx.egui_wants_keyboard_input() && focused == self.frame.focused;

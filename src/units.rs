@@ -83,12 +83,19 @@ pub fn gigabytes(bytes: f64) -> f64 {
     bytes / 1e9
 }
 
+/// In millimetres, without what rounds in metres.
+fn written(length: f64) -> f64 {
+    /// A picometre.
+    const PARTS: f64 = 1e9;
+    (mm(length) * PARTS).round() / PARTS
+}
+
 /// Writes a length (m) as millimetres: for `#[serde(serialize_with)]`.
 ///
 /// # Errors
 /// Those of the serializer.
 pub fn as_mm<S: Serializer>(length: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_f64(mm(*length))
+    serializer.serialize_f64(written(*length))
 }
 
 /// Writes lengths (m) as millimetres.
@@ -96,7 +103,7 @@ pub fn as_mm<S: Serializer>(length: &f64, serializer: S) -> Result<S::Ok, S::Err
 /// # Errors
 /// Those of the serializer.
 pub fn all_as_mm<S: Serializer>(lengths: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(lengths.iter().map(|l| mm(*l)))
+    serializer.collect_seq(lengths.iter().copied().map(written))
 }
 
 /// Writes memory (bytes) as gigabytes.
@@ -130,5 +137,9 @@ mod tests {
         assert_eq!(thousandths(from_thousandths(1234_u32)), 1234.0);
         assert_eq!(to_thousandths(-1.234_56), -1.235);
         assert_eq!(gigabytes(8e9), 8.0);
+        for thickness in [0.9, 1.3, 1.8, 2.6, 4.5] {
+            assert_eq!(written(from_mm(thickness)), thickness);
+        }
+        assert_eq!(written(f64::INFINITY), f64::INFINITY);
     }
 }

@@ -101,7 +101,7 @@ impl Design {
 
     /// The selection that is shown and reported.
     #[must_use]
-    pub fn led(&self) -> Option<&Selection> {
+    pub fn chosen_selection(&self) -> Option<&Selection> {
         self.selections
             .iter()
             .find(|s| s.selector == self.chosen_by)
@@ -110,7 +110,7 @@ impl Design {
     /// The chosen set: the project's selector at its number of gauges.
     #[must_use]
     pub fn chosen_set(&self) -> Option<&SensorSet> {
-        self.led().and_then(|s| s.sets.last())
+        self.chosen_selection().and_then(|s| s.sets.last())
     }
 
     /// The sites of [`Self::chosen_set`].
@@ -200,7 +200,10 @@ impl Design {
     #[must_use]
     pub fn cautions(&self) -> Vec<String> {
         let mut cautions = Vec::new();
-        cautions.extend(self.led().map(|s| named(s, &s.achieved.cautions)));
+        cautions.extend(
+            self.chosen_selection()
+                .map(|s| named(s, &s.achieved.cautions)),
+        );
         cautions.push(self.evaluation.notes.clone());
         cautions.push(self.simulated.achieved.cautions.clone());
         if self.reference.element_mm >= self.simulated.element_mm {

@@ -319,7 +319,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "seconds": seconds,
         "achieved": {
             "work": design.work(),
-            "selection": design.led().map(|s| &s.achieved),
+            "selection": design.chosen_selection().map(|s| &s.achieved),
             "notes": notes,
         },
     })

@@ -75,7 +75,7 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         page,
         "<p class=\"lead\">{chosen} strain gauges, chosen by {} on {}{}, to find where a touch of {} N lands.</p><div class=\"numbers\">",
         design
-            .led()
+            .chosen_selection()
             .map_or(selector.title(), |s| s.selector.title()),
         dataset.signal.name(),
         if design.by_hand {

@@ -31,6 +31,8 @@ const DOUBTFUL: f64 = 0.5;
 const SLACK: f64 = 1.5e-6;
 /// A sample rate until it is known (Hz).
 const RATE: f64 = 1000.0;
+/// Between two samples of the slowest board, with room (s): after a longer break nothing is known of what passed.
+const LONGEST_STEP_S: f64 = 1.5;
 
 /// The state between samples.
 pub struct Pipeline {
@@ -280,7 +282,9 @@ impl Pipeline {
             (None, false)
         };
         let is_found = touches.as_ref().is_some_and(|t| !t.contacts.is_empty());
-        self.feeling.found(is_found, step_s);
+        // What is hardly felt is not strange because nothing was found in it.
+        let passed_s = if self.feeling.clearly() { step_s } else { 0.0 };
+        self.feeling.found(is_found, passed_s);
         if self.release.is_sure(self.proved) {
             self.tare();
             self.news = Some(RestNews::Released);
@@ -363,8 +367,7 @@ impl Pipeline {
                 Under::Touches(touches)
             }
             Some(touches) if !touches.contacts.is_empty() => Under::Unsure,
-            _ if self.feeling.clearly() => Under::Strange,
-            _ if touching => Under::Unsure,
+            _ if touching => Under::Strange,
             _ => Under::Nothing {
                 at_rest: self.feeling.at_rest(),
             },
@@ -384,7 +387,7 @@ impl Pipeline {
             .map(|last| units::seconds_between(last, time_us));
         self.last_time = Some(time_us);
         match step {
-            Some(step) if step > 0.0 && step < 1.0 => {
+            Some(step) if step > 0.0 && step < LONGEST_STEP_S => {
                 // By the step, so that two samples that came together do not look like a fast board.
                 let mean = self.rate.recip() + (step - self.rate.recip()) * 0.02;
                 self.rate = mean.recip().clamp(1.0, 1e5);
@@ -403,13 +406,17 @@ impl Pipeline {
             } else {
                 f64::INFINITY
             };
-            if !self.counting.is_due(time_us, left) {
+            // What is hardly felt any more is followed as long as it is.
+            if !self.feeling.clearly() || !self.counting.is_due(time_us, left) {
                 self.last = None;
                 return (Some(touches), self.counting.is_settled(left));
             }
         }
-        self.last = self.find_one(time_us, strain);
-        let Some(one) = self.last else {
+        let one = self.find_one(time_us, strain);
+        if one.is_some() || self.feeling.clearly() {
+            self.last = one;
+        }
+        let Some(one) = one else {
             return (None, false);
         };
         let several = self.counting.shown().is_some();

@@ -393,7 +393,8 @@ impl<'a> PartialSet<'a> {
                 near += 1;
             }
         }
-        let spacing = plain::digits(units::mm(self.constraints.spacing));
+        // Without what rounds in metres.
+        let spacing = units::to_thousandths(units::mm(self.constraints.spacing));
         let reasons = [
             (near, format!("nearer than {spacing} mm to a gauge")),
             (costly, "dearer than what is left of the budget".to_owned()),

@@ -48,7 +48,7 @@ impl Session {
         if first {
             self.news.happened(Happening::Designed);
         }
-        self.follow_lead();
+        self.follow_selector();
         // Gauges that undo has brought back may be those of this very design.
         self.drive.take |= self.as_designed();
         if self.drive.take {
@@ -73,7 +73,7 @@ impl Session {
                 && !self.better_design_holds(quality)
             {
                 self.results.show_design(slot);
-                self.follow_lead();
+                self.follow_selector();
                 if self.drive.take {
                     self.take_sites();
                 }
@@ -83,7 +83,7 @@ impl Session {
     }
 
     /// Another selector's sites are shown when the project names it: all are there already.
-    pub fn follow_lead(&mut self) {
+    pub fn follow_selector(&mut self) {
         let asked = self.document.state.project.selection.selector;
         let Some(result) = self.results.design.as_mut().map(|d| &mut d.value) else {
             return;

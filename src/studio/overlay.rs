@@ -24,9 +24,15 @@ const MARK: f32 = 9.0;
 /// Whether the next picture has to come soon: the camera moves, or a hand is about to move something. Where it was the camera,
 /// one more frame is asked for, in which it stands.
 pub fn is_hurried(look: LimbLook<'_>, ui: &Ui) -> bool {
-    let camera = look.view.camera.matrix(1.0).to_cols_array();
+    let camera = &look.view.camera;
+    let camera = (
+        camera.matrix(1.0).to_cols_array(),
+        camera.target.to_array(),
+        camera.distance,
+    );
     let before = ui.data_mut(|d| {
-        let kept: &mut Option<[f32; 16]> = d.get_temp_mut_or_default(Id::unique("camera before"));
+        let kept: &mut Option<([f32; 16], [f64; 3], f64)> =
+            d.get_temp_mut_or_default(Id::unique("camera before"));
         kept.replace(camera)
     });
     let moves = before != Some(camera);

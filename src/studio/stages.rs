@@ -9,6 +9,7 @@ use super::view::Stage;
 use super::words::live_in_words;
 use crate::design::{Design, Simulated};
 use crate::session::{Session, Standing};
+use crate::units;
 
 /// The mark of a standing, and its colour.
 fn mark(standing: &Standing) -> (&'static str, egui::Color32) {
@@ -171,11 +172,11 @@ fn simulation_lines(session: &Session) -> Vec<String> {
             return Vec::new();
         }
         let budget = session.budget();
-        let (sites, touches, gigabytes) =
+        let (sites, touches, bytes) =
             crate::design::expected_size(&session.document.inputs(), &budget);
         return vec![format!(
             "about {sites} sites × {touches} touches, {}",
-            memory(gigabytes)
+            memory(units::gigabytes(bytes))
         )];
     };
     let dataset = &s.simulated.dataset;

@@ -278,7 +278,7 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         assert_eq!(hand.chosen(), sites);
         assert_eq!(row(&hand, sites.len()), Some(judged.rows[0].error_mm));
         assert_eq!(row(&hand, 1), row(&design, 1));
-        let sizes: Vec<usize> = (hand.led().unwrap().sets.iter())
+        let sizes: Vec<usize> = (hand.chosen_selection().unwrap().sets.iter())
             .map(|set| set.sites.len())
             .collect();
         assert!(

@@ -339,6 +339,6 @@ fn what_is_not_held_is_told_where_the_part_lies() {
         panic!("nothing holds it");
     };
     let (least, most) = part.bounds();
-    assert!(lower.distance(least * 1e3) < 1e-3, "{lower}");
-    assert!(upper.distance(most * 1e3) < 1e-3, "{upper}");
+    assert!(lower.distance(least) < 1e-6, "{lower}");
+    assert!(upper.distance(most) < 1e-6, "{upper}");
 }

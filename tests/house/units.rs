@@ -63,7 +63,8 @@ impl Factors<'_> {
             match tree {
                 TokenTree::Group(group) => self.scan(&group.stream()),
                 TokenTree::Literal(literal) if sign(k.checked_sub(1)) || sign(Some(k + 1)) => {
-                    let value = literal.to_string().replace('_', "").parse();
+                    let text = literal.to_string().replace('_', "");
+                    let value = text.trim_end_matches("f64").trim_end_matches("f32").parse();
                     if POWERS.contains(&value.unwrap_or(0.0)) {
                         let line = literal.span().start().line;
                         self.found.push(format!("{}:{line}", self.file));
@@ -85,6 +86,12 @@ impl<'ast> Visit<'ast> for Factors<'_> {
     fn visit_impl_item(&mut self, item: &'ast ImplItem) {
         if !is_test(attributes_within(item)) {
             visit::visit_impl_item(self, item);
+        }
+    }
+
+    fn visit_attribute(&mut self, attribute: &'ast syn::Attribute) {
+        if let syn::Meta::List(list) = &attribute.meta {
+            self.scan(&list.tokens);
         }
     }
 

@@ -168,6 +168,27 @@ fn a_standing_touch_outlives_a_drift_and_light_ones_are_felt_under_it() {
     hold(felt > 0.95 && ghosts == 0, "felt and no ghosts");
 }
 
+/// Glued as a workshop does it, so that nobody knows of how unevenly gauges feel what all of them feel.
+#[test]
+fn a_light_touch_stands_for_ten_minutes() {
+    let place = places(20)[3];
+    let standing = Press::new(20.0, 600.0, place, 1.0);
+    let bench = Bench::of(vec![standing, Press::new(640.0, 3.0, place, 10.0)]);
+    let glued = ["--rate", "100", "--bits", "16", "--warming", "2"];
+    let (heard, _) = listen(&bench.record(&glued), &bench.project(&[]));
+    let (unfelt, ghosts) = (bench.unfelt(&heard), bench.ghosts(&heard, 0.0));
+    let last = |h: &&Heard| (560.0..619.0).contains(&h.time_s);
+    let forces: Vec<f64> = (heard.iter().filter(last))
+        .flat_map(|h| h.touches.iter().map(|t| t.1))
+        .collect();
+    let force = forces.iter().sum::<f64>() / forces.len() as f64;
+    println!("ten minutes: {unfelt:?} not felt, {force:.2} N in the last, {ghosts} ghosts");
+    hold(
+        unfelt.is_empty() && ghosts == 0 && (force - 1.0).abs() < 0.25,
+        "felt, 1 N and no ghosts",
+    );
+}
+
 /// The ten gauges of the bundled limb are kind to us: with these others a standing touch was lost after a minute and a half,
 /// or left ghosts, and a tap did so where noise is least.
 #[test]

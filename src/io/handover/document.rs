@@ -51,7 +51,7 @@ fn promise(flow: &mut Flow, source: &HandoverSource<'_>) {
     let chosen = design.chosen().len();
     let selector = source.inputs.project.selection.selector;
     let by = design
-        .led()
+        .chosen_selection()
         .map_or(selector.title(), |s| s.selector.title());
     flow.text(&format!(
         "{chosen} strain gauges, chosen by {by} on {}, to find where a touch of {} N lands.",

@@ -41,7 +41,7 @@ impl DesignResult {
     }
 }
 
-/// Which design it is: what it was computed from, and whose gauges lead.
+/// Which design it is: what it was computed from, and whose gauges are shown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignMark {
     pub(in crate::session) inputs: DesignInputs,

@@ -35,9 +35,9 @@ impl Raster {
         marks: usize,
         draw: impl FnOnce(&mut PixelCanvas) + Send + 'static,
     ) -> Option<&TextureHandle> {
-        self.take_drawn(ctx);
-        let draw = Box::new(draw);
-        if self.shown.as_ref().is_none_or(|(known, _)| *known != key) {
+        self.take_drawn(&key, ctx);
+        let (columns, draw) = (key.2.clone(), Box::new(draw));
+        if !self.is_shown(&key) {
             let order = RasterOrder { key, draw };
             if marks <= AT_ONCE {
                 let (key, image) = order.drawn();
@@ -46,7 +46,13 @@ impl Raster {
                 self.ask(order, ctx);
             }
         }
-        self.shown.as_ref().map(|(_, picture)| picture)
+        // Other columns would be read by the axes of these.
+        let shown = self.shown.as_ref().filter(|(key, _)| key.2 == columns);
+        shown.map(|(_, picture)| picture)
+    }
+
+    fn is_shown(&self, key: &RasterKey) -> bool {
+        self.shown.as_ref().is_some_and(|(known, _)| known == key)
     }
 
     fn ask(&mut self, order: RasterOrder, ctx: &Context) {
@@ -59,11 +65,17 @@ impl Raster {
         self.worker.get_or_insert_with(start).ask(order);
     }
 
-    fn take_drawn(&mut self, ctx: &Context) {
+    fn take_drawn(&mut self, wanted: &RasterKey, ctx: &Context) {
+        if self.is_shown(wanted) {
+            // What was asked for is not wanted any more, and comes too late.
+            self.asked = None;
+        }
         let drawn = self.worker.iter().flat_map(Latest::answers);
         // What broke says nothing of the picture before, which stays.
         let newest = drawn.filter_map(Result::ok).last();
-        if let Some((key, image)) = newest {
+        if let Some((key, image)) = newest
+            && self.asked.is_some()
+        {
             self.show(key, image, ctx);
         }
     }

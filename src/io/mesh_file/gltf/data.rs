@@ -2,8 +2,11 @@
 
 use std::path::{Component, Path};
 
+use base64::Engine as _;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::accessor::{DataType, Dimensions};
-use gltf::buffer::{Data, Source, View};
+use gltf::buffer::{Source, View};
 
 use crate::io::source;
 use crate::memory;
@@ -24,11 +27,8 @@ impl Buffers {
         for buffer in document.buffers() {
             let bytes = match buffer.source() {
                 Source::Uri(uri) if !uri.starts_with("data:") => beside(folder, uri)?,
-                inside => {
-                    let data = Data::from_source_and_blob(inside, None, &mut blob);
-                    data.map_err(|e| format!("the data of the glTF file cannot be read ({e})"))?
-                        .0
-                }
+                inside => within(&inside, &mut blob)
+                    .map_err(|e| format!("the data of the glTF file cannot be read ({e})"))?,
             };
             let (announced, held) = (buffer.length(), bytes.len());
             if held < announced {
@@ -116,6 +116,26 @@ impl Buffers {
             && end.is_some_and(|end| end <= view.length())
             && view_end.is_some_and(|end| end <= held)
     }
+}
+
+/// The bytes that stand in the file itself: in the second part of a GLB file, or written as base64.
+fn within(source: &Source, blob: &mut Option<Vec<u8>>) -> Result<Vec<u8>, String> {
+    let padded =
+        GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
+    let mut bytes = match source {
+        Source::Bin => (blob.take()).ok_or("it has no part with data")?,
+        Source::Uri(uri) => {
+            let (_, text) = uri
+                .split_once(";base64,")
+                .ok_or("only base64 is understood within it")?;
+            GeneralPurpose::new(&STANDARD, padded)
+                .decode(text)
+                .map_err(|e| format!("its base64 is wrong: {e}"))?
+        }
+    };
+    // Some count the bytes that fill the last word, and leave them out.
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    Ok(bytes)
 }
 
 /// The bytes of a file that a glTF file names, which has to lie beside it or below.
