@@ -117,9 +117,9 @@ fn supervised(
 ) -> Result<Option<String>, String> {
     let _ = std::fs::remove_file(folder.join(AT));
     let mut child = begin(args, piece, folder).map_err(|e| e.to_string())?;
-    let told = child.stdout.take();
+    let output = child.stdout.take();
     let (why, heard) = std::thread::scope(|scope| {
-        let listener = scope.spawn(move || told.map_or_else(Vec::new, listen));
+        let listener = scope.spawn(move || output.map_or_else(Vec::new, listen));
         (
             watch(&mut child, folder),
             listener.join().unwrap_or_default(),

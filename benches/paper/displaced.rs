@@ -193,7 +193,7 @@ fn spread(row: &EvaluationRow) -> String {
     )
 }
 
-fn errors(text: &mut String, found: &Evaluation, told: impl Fn(&EvaluationRow) -> String) {
+fn errors(text: &mut String, found: &Evaluation, shown: impl Fn(&EvaluationRow) -> String) {
     let titles = SelectorKind::PAPER.map(SelectorKind::title);
     let _ = writeln!(
         text,
@@ -201,11 +201,11 @@ fn errors(text: &mut String, found: &Evaluation, told: impl Fn(&EvaluationRow) -
         titles.join(" | "),
         "---|".repeat(titles.len())
     );
-    let told = |row: Option<&EvaluationRow>| row.map_or("–".to_owned(), &told);
+    let shown = |row: Option<&EvaluationRow>| row.map_or("–".to_owned(), &shown);
     let mut sizes = SIZES;
     sizes.sort_unstable();
     for gauges in sizes {
-        let cells = SelectorKind::PAPER.map(|kind| told(row(found, kind, gauges)));
+        let cells = SelectorKind::PAPER.map(|kind| shown(row(found, kind, gauges)));
         let _ = writeln!(text, "| {gauges} | {} |", cells.join(" | "));
     }
     if let Some(all) = baseline(found) {
@@ -213,7 +213,7 @@ fn errors(text: &mut String, found: &Evaluation, told: impl Fn(&EvaluationRow) -
             text,
             "\nAll {} candidates together: {}.",
             all.set.sensors,
-            told(Some(all))
+            shown(Some(all))
         );
     }
     text.push('\n');

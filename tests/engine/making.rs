@@ -39,7 +39,7 @@ fn dragged() -> Inputs {
 }
 
 /// The same, by whoever was not told.
-fn untold() -> Inputs {
+fn unaware() -> Inputs {
     let mut inputs = dragged();
     inputs.project.touch.friction_percent = 0.0;
     inputs.project.live.friction_percent = 0.0;
@@ -120,13 +120,13 @@ fn variances_are_those_of_touches_that_are_made_so() {
 
 #[test]
 fn gauges_are_chosen_for_touches_that_drag() {
-    let [knows, other] = [dragged(), untold()].map(|inputs| chosen(&inputs));
+    let [knows, other] = [dragged(), unaware()].map(|inputs| chosen(&inputs));
     assert_ne!(knows, other);
     let expected = |inputs: &Inputs| {
         let sets = [knows.clone(), other.clone()];
         design::expected_errors(inputs, simulated(), &sets, &unwatched).unwrap()
     };
-    let (of_dragged, of_straight) = (expected(&dragged()), expected(&untold()));
+    let (of_dragged, of_straight) = (expected(&dragged()), expected(&unaware()));
     println!("dragged {of_dragged:?}, straight {of_straight:?} mm");
     assert!(of_dragged[0] < of_dragged[1], "{of_dragged:?}");
     assert!(of_straight[1] < of_dragged[1], "{of_straight:?}");
@@ -134,9 +134,9 @@ fn gauges_are_chosen_for_touches_that_drag() {
 
 #[test]
 fn what_is_off_is_expected_to_cost_what_it_costs() {
-    let set = chosen(&untold());
+    let set = chosen(&unaware());
     let with = |change: &dyn Fn(&mut hapdef::project::Project)| {
-        let mut inputs = untold();
+        let mut inputs = unaware();
         change(&mut inputs.project);
         let errors =
             design::expected_errors(&inputs, simulated(), std::slice::from_ref(&set), &unwatched);
@@ -195,14 +195,14 @@ fn whoever_knows_of_friction_finds_touches_better() {
         });
         away.sum::<f64>() / TOUCHES as f64
     };
-    let untold = Uncertainty {
+    let unaware = Uncertainty {
         making: Making::EXACT,
         allowed: 0.0,
         ..sensing.off
     };
-    let [told, untold] = [sensing.off, untold].map(error);
-    println!("told of friction {told:.2} mm, untold {untold:.2} mm");
-    assert!(told < 0.95 * untold, "{told} {untold}");
+    let [told, unaware] = [sensing.off, unaware].map(error);
+    println!("told of friction {told:.2} mm, unaware {unaware:.2} mm");
+    assert!(told < 0.95 * unaware, "{told} {unaware}");
 }
 
 /// What is found of touches that are pushed aside by so much of their force, each in a direction of its own: the mean
@@ -249,7 +249,7 @@ fn a_finger_that_pushes_aside_is_found_with_its_direction() {
         elements: 0.0,
         ..sensing.off
     };
-    let untold = Uncertainty {
+    let unaware = Uncertainty {
         allowed: 0.0,
         ..off
     };
@@ -257,7 +257,7 @@ fn a_finger_that_pushes_aside_is_found_with_its_direction() {
     for degrees in [0.0_f64, 10.0, 20.0] {
         let aside = degrees.to_radians().tan();
         let [told, drag_n, held] = found_of(&sensing, &touches, aside, &off);
-        let [other, _, held_by_other] = found_of(&sensing, &touches, aside, &untold);
+        let [other, _, held_by_other] = found_of(&sensing, &touches, aside, &unaware);
         println!(
             "{degrees}°: {told:.2} mm, {drag_n:.2} N along the surface, {held:.2} held; by whoever takes it for straight {other:.2} mm, {held_by_other:.2} held"
         );

@@ -10,7 +10,7 @@ use crate::inference::{Bench, press};
 #[test]
 fn a_rest_that_was_taken_under_a_press_is_taken_again() {
     const PRESSES: usize = 10;
-    let (mut told, mut ghosts, mut found) = (0, 0, Vec::new());
+    let (mut releases, mut ghosts, mut found) = (0, 0, Vec::new());
     for k in 0..PRESSES {
         let begins = [-1.0, -0.2][k % 2];
         let presses = vec![
@@ -20,7 +20,7 @@ fn a_rest_that_was_taken_under_a_press_is_taken_again() {
         let mut bench = Bench::new(PressScript::Given(presses), Faults::default(), 0.1e-6);
         let mut off = Vec::new();
         bench.run(4_500, |pipeline, update, truth| {
-            told += usize::from(pipeline.news() == Some(RestNews::Released));
+            releases += usize::from(pipeline.news() == Some(RestNews::Released));
             match (truth.touch, update.contact) {
                 (None, Some(_)) if truth.time_us > 1_800_000 => ghosts += 1,
                 (Some(touch), Some(contact)) if truth.time_us > 3_200_000 => {
@@ -33,10 +33,12 @@ fn a_rest_that_was_taken_under_a_press_is_taken_again() {
         found.push(off.iter().sum::<f64>() / off.len() as f64);
     }
     let mean = found.iter().sum::<f64>() / PRESSES as f64;
-    println!("{told} told, {ghosts} samples of ghosts, then {mean:.2} mm off ({found:.2?})");
+    println!(
+        "{releases} releases, {ghosts} samples of ghosts, then {mean:.2} mm off ({found:.2?})"
+    );
     // Letting go takes a moment.
     assert!(ghosts < 10 * PRESSES, "{ghosts}");
-    assert!(told >= PRESSES && mean < 1.5, "{told} {found:?}");
+    assert!(releases >= PRESSES && mean < 1.5, "{releases} {found:?}");
 }
 
 /// Random presses leave a listener alone while it takes its rest, whenever it comes.

@@ -240,5 +240,14 @@ mod tests {
         while shown(&mut raster, 1) != Some(key(1)) {
             assert!(Instant::now() < until);
         }
+        // Other columns have other axes.
+        let others = ([4, 4], Vec::new(), vec![1], false);
+        assert!(raster.of(others, &ctx, AT_ONCE + 1, |_| ()).is_none());
+        // What comes after one has gone back to what is shown is not shown.
+        assert_eq!(shown(&mut raster, 1), Some(key(1)));
+        for _ in 0..50 {
+            std::thread::sleep(Duration::from_millis(1));
+            assert_eq!(shown(&mut raster, 1), Some(key(1)));
+        }
     }
 }
