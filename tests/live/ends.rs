@@ -239,7 +239,6 @@ fn boxed(folder: &Path, sides: [f64; 3], last: [f64; 3], model: &str) -> String 
     );
     std::fs::write(&project, keys).unwrap();
     let out = folder.join("x.npz");
-    let begun = std::time::Instant::now();
     let done = hapdef(&[
         "simulate",
         project.to_str().unwrap(),
@@ -248,8 +247,8 @@ fn boxed(folder: &Path, sides: [f64; 3], last: [f64; 3], model: &str) -> String 
     ]);
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(1), "{said}");
-    assert!(begun.elapsed().as_secs() < 10, "{said}");
-    assert!(!out.exists());
+    // It is refused before anything is computed.
+    assert!(!said.contains("Assembling") && !out.exists(), "{said}");
     said
 }
 
