@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::judge::{judge_as_asked, reference};
+use super::judge::{JudgedOn, reference};
 use super::{Design, DesignError, Inputs};
 use crate::budget::Watch;
 use crate::evaluation::{
@@ -42,9 +42,15 @@ pub fn judge_set(
     };
     let streams: Vec<u64> = reference.sites.iter().map(stream).collect();
     let sets = [set];
-    judge_as_asked(
-        inputs, simulated, &reference, &sets, &streams, budget, watch,
-    )
+    let on = JudgedOn {
+        inputs,
+        simulated,
+        reference: &reference,
+        streams: &streams,
+        budget,
+        watch,
+    };
+    on.judge_as_asked(&sets)
 }
 
 impl Design {

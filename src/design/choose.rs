@@ -96,6 +96,21 @@ fn nearest(positions: &[DVec3], at: DVec3) -> Option<usize> {
 /// Called with every set as soon as it is found, with the sites it counts in.
 pub type OnFound<'a> = &'a (dyn Fn(SelectorKind, &SensorSet, &[Site]) + Sync);
 
+/// What gauges are chosen from, and for: the same for every selector.
+#[derive(Clone, Copy)]
+pub struct Choosing<'a> {
+    /// What the user asks for.
+    pub inputs: &'a Inputs,
+    /// What the model says of every site.
+    pub simulated: &'a Simulated,
+    /// The feasible ones of these.
+    pub reduced: &'a ReducedSites,
+    /// What may be spent.
+    pub budget: &'a Budget,
+    /// Who is asked whether to go on.
+    pub watch: Watch<'a>,
+}
+
 /// Runs one selector.
 ///
 /// # Errors
@@ -108,32 +123,14 @@ pub fn select(
     budget: &Budget,
     watch: Watch,
 ) -> Result<Selection, DesignError> {
-    let unwatched: OnFound = &|_, _, _| ();
-    select_step_by_step(inputs, simulated, reduced, kind, budget, watch, unwatched)
-}
-
-/// As [`select`], telling of every step.
-///
-/// # Errors
-/// As [`select`].
-pub fn select_step_by_step(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    kind: SelectorKind,
-    budget: &Budget,
-    watch: Watch,
-    found: OnFound,
-) -> Result<Selection, DesignError> {
-    let mut selection = choose(inputs, simulated, reduced, kind, budget, watch, found)?;
-    // Expected error is judged on a sample of presses, whose scatter counts beside what elements leave open: which of
-    // its picks are firm is not known.
-    if kind != SelectorKind::ExpectedError {
-        let tolerance = model_tolerance(inputs, simulated);
-        let firm = margin::within_model(&selection.sets, tolerance);
-        selection.achieved.notes.extend(firm);
-    }
-    Ok(selection)
+    let from = Choosing {
+        inputs,
+        simulated,
+        reduced,
+        budget,
+        watch,
+    };
+    from.select_step_by_step(kind, &|_, _, _| ())
 }
 
 /// What elements leave open of any criterion, as a share: a pick that leads by less than twice this may be another
@@ -152,175 +149,169 @@ pub fn model_tolerance(inputs: &Inputs, simulated: &Simulated) -> f64 {
     }
 }
 
-fn choose(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    kind: SelectorKind,
-    budget: &Budget,
-    watch: Watch,
-    found: OnFound,
-) -> Result<Selection, DesignError> {
-    let found = |set: &SensorSet| found(kind, set, &simulated.dataset.sites);
-    let telling: Telling = (watch, &found);
-    match kind {
-        SelectorKind::ExpectedError => {
-            select_by_expected_error(inputs, simulated, reduced, budget, telling)
-        }
-        SelectorKind::GreedySvr => select_by_svr(inputs, simulated, reduced, budget, telling),
-        SelectorKind::PcaQr => select_by_pivots(inputs, simulated, reduced, telling),
-        SelectorKind::Entropy => {
-            let by: ByGeometry =
-                &|geometry, pool, request| Entropy { geometry }.select(pool, request);
-            select_by_geometry(inputs, simulated, reduced, by, budget, telling)
-        }
-        SelectorKind::MutualInformation => {
-            let by: ByGeometry =
-                &|geometry, pool, request| MutualInformation { geometry }.select(pool, request);
-            select_by_geometry(inputs, simulated, reduced, by, budget, telling)
-        }
-    }
-}
-
 /// Who is asked whether to go on, and told of each set.
 type Telling<'a> = (Watch<'a>, &'a (dyn Fn(&SensorSet) + Sync));
-
-fn select_by_pivots(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    telling: Telling,
-) -> Result<Selection, DesignError> {
-    let offer = OfferedSites::new(inputs, simulated, &reduced.feasible)?;
-    let x = noisy_signals(inputs, reduced);
-    let with_noise = inputs.project.selection.with_noise;
-    let targets = simulated.dataset.targets_mm();
-    let selection = offer.choose(&x, &targets, telling, |pool, request| {
-        if with_noise {
-            pca_qr::PcaQr.select(pool, request)
-        } else {
-            pca_qr::from_components(reduced.components(telling.0)?, pool, request)
-        }
-    })?;
-    Ok(selection)
-}
 
 /// A selector that asks a Gaussian process over the sites.
 type ByGeometry<'a> =
     &'a dyn Fn(&Geometry, &Pool, &SelectionRequest) -> Result<Selection, PlacementError>;
 
-fn select_by_geometry(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    by: ByGeometry,
-    budget: &Budget,
-    telling: Telling,
-) -> Result<Selection, DesignError> {
-    let located = reduced.locate(inputs, simulated, budget, telling.0)?;
-    let Located { geometry, rows, .. } = located;
-    let known: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
-    let offer = OfferedSites::new(inputs, simulated, &known)?;
-    let x = reduced.x.select_rows(rows);
-    let targets = simulated.dataset.targets_mm();
-    let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
-        by(geometry, pool, request)
-    })?;
-    if known.len() < reduced.feasible.len() {
-        selection.achieved.notes.push(format!(
-            "Chosen from {} of {} feasible sites, evenly taken.",
-            known.len(),
-            reduced.feasible.len()
-        ));
+impl Choosing<'_> {
+    /// As [`select`], telling of every step.
+    ///
+    /// # Errors
+    /// As [`select`].
+    pub fn select_step_by_step(
+        &self,
+        kind: SelectorKind,
+        found: OnFound,
+    ) -> Result<Selection, DesignError> {
+        let sites = &self.simulated.dataset.sites;
+        let found = |set: &SensorSet| found(kind, set, sites);
+        let mut selection = self.choose(kind, (self.watch, &found))?;
+        // Expected error is judged on a sample of presses, whose scatter counts beside what elements leave open: which of
+        // its picks are firm is not known.
+        if kind != SelectorKind::ExpectedError {
+            let tolerance = model_tolerance(self.inputs, self.simulated);
+            let firm = margin::within_model(&selection.sets, tolerance);
+            selection.achieved.notes.extend(firm);
+        }
+        Ok(selection)
     }
-    Ok(selection)
-}
 
-fn select_by_expected_error(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    budget: &Budget,
-    telling: Telling,
-) -> Result<Selection, DesignError> {
-    let known = KnownSimulation::new(inputs, simulated);
-    let variance = |row: usize, touch: usize| known.variance(reduced.feasible[row], touch);
-    let felt = |row: usize, touch: usize| known.felt(reduced.feasible[row], touch);
-    let shared = known.shared(&felt);
-    let selector = ExpectedError {
-        known: known.knowledge(&variance, &shared),
-        detail: detail(budget),
-        rounds: expected_error::ROUNDS,
-    };
-    let offer = OfferedSites::new(inputs, simulated, &reduced.feasible)?;
-    let targets = simulated.dataset.targets_mm();
-    let selection = offer.choose(&reduced.x, &targets, telling, |pool, request| {
-        selector.select(pool, request)
-    })?;
-    Ok(selection)
-}
-
-/// The feasible sites nearest to the places where gauges must be: rows of the reduced signals.
-fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &ReducedSites) -> Vec<usize> {
-    let positions: Vec<DVec3> = (reduced.feasible.iter())
-        .map(|&s| simulated.dataset.sites[s].gauge.position)
-        .collect();
-    let required = inputs.project.selection.required();
-    required.filter_map(|at| nearest(&positions, at)).collect()
-}
-
-fn select_by_svr(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    budget: &Budget,
-    telling: Telling,
-) -> Result<Selection, DesignError> {
-    let all = simulated.dataset.targets_mm();
-    let sensors = inputs.project.selection.sensors;
-    let limit = budget.selection_candidates.max(sensors);
-    let candidates = reduced.candidates(telling.0)?;
-    let mut rows = if candidates.rows.len() > limit {
-        reduced.components(telling.0)?.pivots(limit)
-    } else {
-        candidates.rows.clone()
-    };
-    // A place that must have a gauge is a candidate whether or not the reduction kept it.
-    for row in required_rows(inputs, simulated, reduced) {
-        if !rows.contains(&row) {
-            rows.push(row);
+    fn choose(&self, kind: SelectorKind, telling: Telling) -> Result<Selection, DesignError> {
+        match kind {
+            SelectorKind::ExpectedError => self.by_expected_error(telling),
+            SelectorKind::GreedySvr => self.by_svr(telling),
+            SelectorKind::PcaQr => self.by_pivots(telling),
+            SelectorKind::Entropy => {
+                let by: ByGeometry =
+                    &|geometry, pool, request| Entropy { geometry }.select(pool, request);
+                self.by_geometry(by, telling)
+            }
+            SelectorKind::MutualInformation => {
+                let by: ByGeometry =
+                    &|geometry, pool, request| MutualInformation { geometry }.select(pool, request);
+                self.by_geometry(by, telling)
+            }
         }
     }
-    let sites: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
-    let touches = evenly(all.len(), budget.selection_touches);
-    let noisy_signals = noisy_signals(inputs, reduced);
-    let x = noisy_signals.select_rows(&rows).select_columns(&touches);
-    let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
-    let selector = GreedySvr {
-        hyper: inputs.project.hyper(),
-        folds: budget.folds,
-        seed: inputs.project.budget.seed,
-        // Computed touches lie apart.
-        grouping: Grouping::Touch,
-        effort: Effort {
-            tolerance: budget.svr_tolerance_mm,
-            max_steps: budget.svr_steps,
-        },
-        tolerance: greedy_svr::TOLERANCE,
-        landmarks: 1.0,
-    };
-    let offer = OfferedSites::new(inputs, simulated, &sites)?;
-    let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
-        selector.select(pool, request)
-    })?;
-    if touches.len() < all.len() || sites.len() < candidates.rows.len() {
-        selection.achieved.notes.push(format!(
-            "Scored on {} of {} touches and {} of {} candidates.",
-            touches.len(),
-            all.len(),
-            sites.len(),
-            candidates.rows.len()
-        ));
+
+    fn offer<'s>(&self, sites: &'s [usize]) -> Result<OfferedSites<'s>, DesignError> {
+        OfferedSites::new(self.inputs, self.simulated, sites)
     }
-    Ok(selection)
+
+    fn by_pivots(&self, telling: Telling) -> Result<Selection, DesignError> {
+        let offer = self.offer(&self.reduced.feasible)?;
+        let x = noisy_signals(self.inputs, self.reduced);
+        let with_noise = self.inputs.project.selection.with_noise;
+        let targets = self.simulated.dataset.targets_mm();
+        let selection = offer.choose(&x, &targets, telling, |pool, request| {
+            if with_noise {
+                pca_qr::PcaQr.select(pool, request)
+            } else {
+                pca_qr::from_components(self.reduced.components(telling.0)?, pool, request)
+            }
+        })?;
+        Ok(selection)
+    }
+
+    fn by_geometry(&self, by: ByGeometry, telling: Telling) -> Result<Selection, DesignError> {
+        let located = self
+            .reduced
+            .locate(self.inputs, self.simulated, self.budget, telling.0)?;
+        let Located { geometry, rows, .. } = located;
+        let known: Vec<usize> = rows.iter().map(|&r| self.reduced.feasible[r]).collect();
+        let offer = self.offer(&known)?;
+        let x = self.reduced.x.select_rows(rows);
+        let targets = self.simulated.dataset.targets_mm();
+        let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
+            by(geometry, pool, request)
+        })?;
+        if known.len() < self.reduced.feasible.len() {
+            selection.achieved.notes.push(format!(
+                "Chosen from {} of {} feasible sites, evenly taken.",
+                known.len(),
+                self.reduced.feasible.len()
+            ));
+        }
+        Ok(selection)
+    }
+
+    fn by_expected_error(&self, telling: Telling) -> Result<Selection, DesignError> {
+        let known = KnownSimulation::new(self.inputs, self.simulated);
+        let variance = |row: usize, touch: usize| known.variance(self.reduced.feasible[row], touch);
+        let felt = |row: usize, touch: usize| known.felt(self.reduced.feasible[row], touch);
+        let shared = known.shared(&felt);
+        let selector = ExpectedError {
+            known: known.knowledge(&variance, &shared),
+            detail: detail(self.budget),
+            rounds: expected_error::ROUNDS,
+        };
+        let offer = self.offer(&self.reduced.feasible)?;
+        let targets = self.simulated.dataset.targets_mm();
+        let selection = offer.choose(&self.reduced.x, &targets, telling, |pool, request| {
+            selector.select(pool, request)
+        })?;
+        Ok(selection)
+    }
+
+    /// The feasible sites nearest to the places where gauges must be: rows of the reduced signals.
+    fn required_rows(&self) -> Vec<usize> {
+        let positions: Vec<DVec3> = (self.reduced.feasible.iter())
+            .map(|&s| self.simulated.dataset.sites[s].gauge.position)
+            .collect();
+        let required = self.inputs.project.selection.required();
+        required.filter_map(|at| nearest(&positions, at)).collect()
+    }
+
+    fn by_svr(&self, telling: Telling) -> Result<Selection, DesignError> {
+        let all = self.simulated.dataset.targets_mm();
+        let sensors = self.inputs.project.selection.sensors;
+        let limit = self.budget.selection_candidates.max(sensors);
+        let candidates = self.reduced.candidates(telling.0)?;
+        let mut rows = if candidates.rows.len() > limit {
+            self.reduced.components(telling.0)?.pivots(limit)
+        } else {
+            candidates.rows.clone()
+        };
+        // A place that must have a gauge is a candidate whether or not the reduction kept it.
+        for row in self.required_rows() {
+            if !rows.contains(&row) {
+                rows.push(row);
+            }
+        }
+        let sites: Vec<usize> = rows.iter().map(|&r| self.reduced.feasible[r]).collect();
+        let touches = evenly(all.len(), self.budget.selection_touches);
+        let noisy_signals = noisy_signals(self.inputs, self.reduced);
+        let x = noisy_signals.select_rows(&rows).select_columns(&touches);
+        let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
+        let selector = GreedySvr {
+            hyper: self.inputs.project.hyper(),
+            folds: self.budget.folds,
+            seed: self.inputs.project.budget.seed,
+            // Computed touches lie apart.
+            grouping: Grouping::Touch,
+            effort: Effort {
+                tolerance: self.budget.svr_tolerance_mm,
+                max_steps: self.budget.svr_steps,
+            },
+            tolerance: greedy_svr::TOLERANCE,
+            landmarks: 1.0,
+        };
+        let offer = self.offer(&sites)?;
+        let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
+            selector.select(pool, request)
+        })?;
+        if touches.len() < all.len() || sites.len() < candidates.rows.len() {
+            selection.achieved.notes.push(format!(
+                "Scored on {} of {} touches and {} of {} candidates.",
+                touches.len(),
+                all.len(),
+                sites.len(),
+                candidates.rows.len()
+            ));
+        }
+        Ok(selection)
+    }
 }

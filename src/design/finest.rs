@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::judge::{ByMatching, judge, measured_by};
+use super::judge::{JudgedOn, measured_by};
 use super::layout::{lay_out_sites, touches_on};
 use super::{Design, DesignError, Inputs, Meshed, Reference, Simulated, ground};
 use crate::budget::{Budget, ElementBudget, Watch};
@@ -125,19 +125,17 @@ impl Finest {
             ..design.budget
         };
         let streams: Vec<u64> = reference.sites.iter().map(|&s| s as u64).collect();
+        let on = JudgedOn {
+            inputs,
+            simulated,
+            reference: &reference,
+            streams: &streams,
+            budget: &budget,
+            watch,
+        };
         let found = match &inputs.project.judging().at_middle() {
-            Judging::Svr => judge(
-                inputs, simulated, &reference, &sets, &streams, &budget, watch,
-            )?,
-            Judging::Matching(forces) => ByMatching {
-                inputs,
-                simulated,
-                reference: &reference,
-                streams: &streams,
-                forces,
-                budget: &budget,
-            }
-            .judge(&sets, watch)?,
+            Judging::Svr => on.by_regression(&sets)?,
+            Judging::Matching(forces) => on.by_matching(forces, &sets)?,
         };
         let everywhere = found.rows.first();
         let of = |figure: fn(&EvaluationRow) -> f64| everywhere.map_or(f64::NAN, figure);

@@ -20,7 +20,7 @@ use crate::elasticity::Model;
 use crate::elasticity::load::{Push, Touch};
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::evaluation::{
-    self, Candidate, Chooser, EstimatorKind, Evaluation, EvaluationTrial, Judging,
+    self, Candidate, Chooser, EstimatorKind, Evaluation, EvaluationTrial, Judging, JudgingForces,
 };
 use crate::gauge::Gauge;
 use crate::mesh::TriMesh;
@@ -29,7 +29,7 @@ use crate::regression::folds::evenly;
 use crate::uncertainty::Gluing;
 use crate::units;
 
-pub(super) use self::matched::ByMatching;
+use self::matched::ByMatching;
 pub use crate::placement::expected_error::BLIND;
 
 /// Measures sites on the reference model: a mesh of half the element size, test touches drawn uniformly at random
@@ -215,74 +215,91 @@ pub fn evaluate(
         });
     }
     let streams: Vec<u64> = (0..reference.sites.len() as u64).collect();
-    judge_as_asked(inputs, simulated, reference, &sets, &streams, budget, watch)
-}
-
-/// Judges sets by the estimator that the project asks for.
-pub(super) fn judge_as_asked(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reference: &Reference,
-    sets: &[Candidate],
-    streams: &[u64],
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Evaluation, DesignError> {
-    let project = &inputs.project;
-    if let Judging::Matching(forces) = &project.judging() {
-        let trial = ByMatching {
-            inputs,
-            simulated,
-            reference,
-            streams,
-            forces,
-            budget,
-        };
-        return trial.judge(sets, watch);
-    }
-    let mut found = judge(inputs, simulated, reference, sets, streams, budget, watch)?;
-    if project.evaluation.estimator != EstimatorKind::Svr {
-        found.notes.push(format!(
-            "Judged by regression, although evaluation.estimator asks for matching: that knows strain only, and gauge.signal is {}.",
-            project.gauge.signal.name()
-        ));
-    }
-    Ok(found)
-}
-
-/// Judges sets by regression.
-pub(super) fn judge(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reference: &Reference,
-    sets: &[Candidate],
-    streams: &[u64],
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Evaluation, Cancelled> {
-    let train = simulated.dataset.x.select_rows(&reference.sites);
-    let test_targets: Vec<[f64; 3]> = reference
-        .touches
-        .iter()
-        .map(|t| units::mm(t.position).to_array())
-        .collect();
-    evaluation::evaluate(
-        &EvaluationTrial {
-            signal: simulated.dataset.signal,
-            train: &train,
-            train_targets: &simulated.dataset.targets_mm(),
-            test: &reference.x,
-            workshop: &reference.workshop,
-            test_targets: &test_targets,
-            regions: &reference.regions,
-            noise: inputs.project.uncertainty().of_channel(),
-            streams,
-            seed: inputs.project.budget.seed.wrapping_add(NOISE_SEED),
-        },
-        sets,
+    let on = JudgedOn {
+        inputs,
+        simulated,
+        reference,
+        streams: &streams,
         budget,
         watch,
-    )
+    };
+    on.judge_as_asked(&sets)
+}
+
+/// What sets are judged on: the same for all of them.
+#[derive(Clone, Copy)]
+pub(super) struct JudgedOn<'a> {
+    pub inputs: &'a Inputs,
+    pub simulated: &'a Simulated,
+    pub reference: &'a Reference,
+    /// Of the noise, one a site of the reference.
+    pub streams: &'a [u64],
+    pub budget: &'a Budget,
+    pub watch: Watch<'a>,
+}
+
+impl JudgedOn<'_> {
+    /// Judges sets by the estimator that the project asks for.
+    pub fn judge_as_asked(&self, sets: &[Candidate]) -> Result<Evaluation, DesignError> {
+        let project = &self.inputs.project;
+        if let Judging::Matching(forces) = &project.judging() {
+            return self.by_matching(forces, sets);
+        }
+        let mut found = self.by_regression(sets)?;
+        if project.evaluation.estimator != EstimatorKind::Svr {
+            found.notes.push(format!(
+                "Judged by regression, although evaluation.estimator asks for matching: that knows strain only, and gauge.signal is {}.",
+                project.gauge.signal.name()
+            ));
+        }
+        Ok(found)
+    }
+
+    /// Judges sets by matching readings, at these forces.
+    pub fn by_matching(
+        &self,
+        forces: &JudgingForces,
+        sets: &[Candidate],
+    ) -> Result<Evaluation, DesignError> {
+        let trial = ByMatching {
+            inputs: self.inputs,
+            simulated: self.simulated,
+            reference: self.reference,
+            streams: self.streams,
+            forces,
+            budget: self.budget,
+        };
+        trial.judge(sets, self.watch)
+    }
+
+    /// Judges sets by regression.
+    pub fn by_regression(&self, sets: &[Candidate]) -> Result<Evaluation, Cancelled> {
+        let (dataset, reference) = (&self.simulated.dataset, self.reference);
+        let train = dataset.x.select_rows(&reference.sites);
+        let test_targets: Vec<[f64; 3]> = reference
+            .touches
+            .iter()
+            .map(|t| units::mm(t.position).to_array())
+            .collect();
+        let project = &self.inputs.project;
+        evaluation::evaluate(
+            &EvaluationTrial {
+                signal: dataset.signal,
+                train: &train,
+                train_targets: &dataset.targets_mm(),
+                test: &reference.x,
+                workshop: &reference.workshop,
+                test_targets: &test_targets,
+                regions: &reference.regions,
+                noise: project.uncertainty().of_channel(),
+                streams: self.streams,
+                seed: project.budget.seed.wrapping_add(NOISE_SEED),
+            },
+            sets,
+            self.budget,
+            self.watch,
+        )
+    }
 }
 
 /// An estimate of the mean error (mm) of a set of sites, from the training touches alone: quick, and good

@@ -6,8 +6,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    DesignError, Inputs, OnFound, ReducedSites, Reference, Simulated, evaluate, expected_errors,
-    filter, reduce_sites, reference, refine, select_step_by_step, simulate, sites_to_judge,
+    Choosing, DesignError, Inputs, OnFound, ReducedSites, Reference, Simulated, evaluate,
+    expected_errors, filter, reduce_sites, reference, refine, simulate, sites_to_judge,
 };
 use crate::budget::{Budget, Watch, Work};
 use crate::evaluation::{Chooser, Evaluation, EvaluationRow, SetId};
@@ -343,9 +343,14 @@ pub fn run_step_by_step(
     let (simulated, selections) = if let Some(known) = known.selections {
         (simulated, known)
     } else {
-        let mut chosen = select_all(
-            inputs, &simulated, &reduced, kinds, budget, &mut times, hooks,
-        )?;
+        let from = Choosing {
+            inputs,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget,
+            watch,
+        };
+        let mut chosen = select_all(&from, kinds, &mut times, hooks.found)?;
         let refined = finish_chosen(inputs, simulated, &reduced, &mut chosen, budget, hooks)?;
         if inputs.project.selection.refine {
             times.lap("refine places");
@@ -416,20 +421,14 @@ fn candidates(
 }
 
 fn select_all(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
+    from: &Choosing,
     kinds: &[SelectorKind],
-    budget: &Budget,
     times: &mut Stopwatch,
-    hooks: &Hooks,
+    found: OnFound,
 ) -> Result<Vec<Selection>, DesignError> {
     let mut selections = Vec::new();
     for &kind in kinds {
-        let (watch, found) = (hooks.watch, hooks.found);
-        selections.push(select_step_by_step(
-            inputs, simulated, reduced, kind, budget, watch, found,
-        )?);
+        selections.push(from.select_step_by_step(kind, found)?);
         times.lap(match kind {
             SelectorKind::GreedySvr => "select greedy-svr",
             SelectorKind::PcaQr => "select pca-qr",

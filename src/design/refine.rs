@@ -23,7 +23,7 @@ use glam::DVec3;
 
 use self::room::GaugeRoom;
 use super::known::{FINE, KnownSimulation, detail};
-use super::{DesignError, Inputs, ReducedSites, Simulated};
+use super::{Choosing, DesignError, Inputs, ReducedSites, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
 use crate::elasticity::Touch;
@@ -75,7 +75,14 @@ pub fn refine(
         );
         return Ok(simulated);
     }
-    let refined = search(inputs, &simulated, reduced, &set.sites, budget, watch)?;
+    let from = Choosing {
+        inputs,
+        simulated: &simulated,
+        reduced,
+        budget,
+        watch,
+    };
+    let refined = search(&from, &set.sites)?;
     selection.achieved.effort += refined.work;
     let moved: Vec<&MovingGauge> = refined.gauges.iter().filter(|g| g.moved).collect();
     if moved.is_empty() {
@@ -142,14 +149,14 @@ impl Refined {
     }
 }
 
-fn search(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    set: &[usize],
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Refined, DesignError> {
+fn search(from: &Choosing, set: &[usize]) -> Result<Refined, DesignError> {
+    let Choosing {
+        inputs,
+        simulated,
+        reduced,
+        budget,
+        watch,
+    } = *from;
     let keys = &inputs.project.selection;
     let known = KnownSimulation::new(inputs, simulated);
     // Of gauges that move it is told seat by seat.
