@@ -202,6 +202,18 @@ fn dataset_time(text: &mut String, reference: f64) {
     text.push('\n');
 }
 
+/// Touches at random, away from the edges.
+fn unseen(inputs: &design::Inputs, count: usize, seed: u64) -> Vec<Touch> {
+    let pattern = dataset::TouchPattern {
+        count,
+        seed,
+        margin: 2.4e-3,
+        even: false,
+        tip: inputs.project.tip(),
+    };
+    dataset::distribute_touches(&inputs.part, &pattern, None)
+}
+
 /// Mesh size × tip model × signal: error against a much finer model with the real tip, and time.
 fn trade(text: &mut String) {
     const SIZES: [usize; 5] = [800, 1600, 3200, 6400, 12_800];
@@ -216,11 +228,8 @@ fn trade(text: &mut String) {
     else {
         unreachable!("the limb is a shell")
     };
-    let (force, tip) = inputs.project.tip();
-    let touches =
-        dataset::distribute_touches(&inputs.part, 64, 99, 2.4e-3, false, (force, tip), None);
-    let many =
-        dataset::distribute_touches(&inputs.part, 1000, 98, 2.4e-3, false, (force, tip), None);
+    let (_, tip) = inputs.project.tip();
+    let (touches, many) = (unseen(&inputs, 64, 99), unseen(&inputs, 1000, 98));
     let draft = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).expect("simulates");
     let places: Vec<DVec3> = draft
         .dataset
@@ -264,15 +273,13 @@ fn trade(text: &mut String) {
             .collect();
         let solve = |signal| {
             on_one_core(|| {
-                dataset::simulate(
-                    &model,
-                    many.clone(),
-                    &points,
+                let asked = dataset::AskedSignals {
                     signal,
-                    1,
-                    (&[], &Making::EXACT),
-                    &unwatched,
-                )
+                    directions: 1,
+                    slope_touches: &[],
+                    making: &Making::EXACT,
+                };
+                dataset::simulate(&model, many.clone(), &points, &asked, &unwatched)
             })
             .1
         };

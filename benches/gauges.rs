@@ -152,7 +152,15 @@ fn compare(text: &mut String, mut inputs: Inputs, quality: Quality) {
     let budget = quality.budget();
     let before = cpu_seconds();
     let kinds = [SelectorKind::ExpectedError];
-    let design = match design::run(&inputs, &kinds, &budget, &cpu_seconds, &unwatched) {
+    let design = match design::run(
+        &design::DesignRequest {
+            inputs: &inputs,
+            kinds: &kinds,
+            budget: &budget,
+        },
+        &cpu_seconds,
+        &unwatched,
+    ) {
         Ok(design) => design,
         Err(error) => {
             let _ = writeln!(text, "No gauges can be chosen: {error}.\n");
@@ -197,8 +205,15 @@ fn chosen(inputs: &Inputs, design: &Design, budget: &Budget) -> Vec<(Selection, 
         let mut inputs = inputs.clone();
         inputs.project.selection.sensors = sensors;
         let (simulated, reduced) = (&design.simulated, &design.reduced);
-        design::select(&inputs, simulated, reduced, kind, budget, &unwatched)
-            .expect("gauges can be chosen")
+        design::Choosing {
+            inputs: &inputs,
+            simulated,
+            reduced,
+            budget,
+            watch: &unwatched,
+        }
+        .select(kind)
+        .expect("gauges can be chosen")
     };
     let most = SIZES[SIZES.len() - 1];
     (SelectorKind::ALL.into_iter())
@@ -296,9 +311,14 @@ impl Part {
             .collect();
         design::reference(inputs, simulated, &sites, &budget, &unwatched)
             .and_then(|reference| {
-                design::evaluate(
-                    inputs, simulated, reduced, selections, &reference, &budget, &unwatched,
-                )
+                design::Choosing {
+                    inputs,
+                    simulated,
+                    reduced,
+                    budget: &budget,
+                    watch: &unwatched,
+                }
+                .evaluate(selections, &reference)
             })
             .expect("sets can be judged")
     }

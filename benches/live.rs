@@ -413,16 +413,14 @@ impl Lab {
         let places = board::places(&self.inputs, &self.sensing, SEED).expect("places");
         let script =
             PressScript::random(places, RandomPresses::usual([2.0, 15.0], Making::EXACT), 1);
-        let made = board::simulated(
-            &self.inputs,
-            &self.sensing,
-            Workshop::All,
+        let asked = board::BoardRequest {
+            workshop: Workshop::All,
             script,
-            Some(15.0),
+            hardest: Some(15.0),
             options,
             faults,
-            &unwatched,
-        );
+        };
+        let made = board::simulated(&self.inputs, &self.sensing, asked, &unwatched);
         let door = doorway().open().expect("a port");
         host(made.expect("the board"), door, |_| {}).expect("a thread")
     }

@@ -81,9 +81,11 @@ fn inputs(signal: Signal) -> Inputs {
 
 fn run(quality: Quality, signal: Signal) -> Design {
     design::run(
-        &inputs(signal),
-        &SelectorKind::PAPER,
-        &quality.budget(),
+        &design::DesignRequest {
+            inputs: &inputs(signal),
+            kinds: &SelectorKind::PAPER,
+            budget: &quality.budget(),
+        },
         &cpu_seconds,
         &unwatched,
     )
@@ -179,9 +181,14 @@ fn limb(text: &mut String) {
 }
 
 fn touches(part: &TriMesh, inputs: &Inputs, count: usize) -> Vec<Touch> {
-    let all =
-        dataset::distribute_touches(part, count, 77, 2.4e-3, false, inputs.project.tip(), None);
-    all.into_iter()
+    let pattern = dataset::TouchPattern {
+        count,
+        seed: 77,
+        margin: 2.4e-3,
+        even: false,
+        tip: inputs.project.tip(),
+    };
+    (dataset::distribute_touches(part, &pattern, None).into_iter())
         .filter(|t| (0.012..=0.108).contains(&t.position.z))
         .collect()
 }

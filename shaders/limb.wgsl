@@ -44,21 +44,9 @@ fn vs(v: Vertex) -> Fragment {
     return placed(v);
 }
 
-// Facets at a sharp edge are lit by themselves: the normals of their corners are the mean of both sides, and would round the
-// edge off. Facets of what is round keep the normals of their corners.
-fn normal_at(f: Fragment) -> vec3f {
-    let smoothed = normalize(f.normal);
-    let across = cross(dpdx(f.world), dpdy(f.world));
-    let size = length(across);
-    if (size <= 0.0) { return smoothed; }
-    var facet = across / size;
-    if (dot(facet, smoothed) < 0.0) { facet = -facet; }
-    return normalize(mix(facet, smoothed, smoothstep(0.85, 0.96, dot(facet, smoothed))));
-}
-
 fn colour(f: Fragment, front: bool) -> vec3f {
     let to_eye = normalize(scene.eye.xyz - f.world);
-    var n = normal_at(f);
+    var n = normalize(f.normal);
     if (dot(n, to_eye) < 0.0) { n = -n; }
     let headlight = max(dot(n, to_eye), 0.0);
     let sky = 0.5 + 0.5 * dot(n, scene.up.xyz);

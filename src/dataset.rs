@@ -227,18 +227,35 @@ fn accepted_area(
     area * accepted as f64 / tried.len().max(1) as f64
 }
 
-/// `count` touches spread over the surface, at least `margin` (m) from free edges: evenly for a model
-/// to learn from, uniformly at random for tests.
+/// How touches are spread over a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct TouchPattern {
+    /// How many there are.
+    pub count: usize,
+    /// Of their places.
+    pub seed: u64,
+    /// How far they stay from free edges (m).
+    pub margin: f64,
+    /// Evenly, for a model to learn from; else uniformly at random, for tests.
+    pub even: bool,
+    /// Force (N) and radius of the tip (m).
+    pub tip: (f64, f64),
+}
+
+/// Touches spread over the surface, or over a region of it.
 #[must_use]
 pub fn distribute_touches(
     mesh: &TriMesh,
-    count: usize,
-    seed: u64,
-    margin: f64,
-    even: bool,
-    tip: (f64, f64),
+    pattern: &TouchPattern,
     region: Option<&TouchRegion>,
 ) -> Vec<Touch> {
+    let TouchPattern {
+        count,
+        seed,
+        margin,
+        even,
+        tip: (force, tip_radius),
+    } = *pattern;
     let rims: Vec<u32> = (0..)
         .zip(mesh.boundary_vertices())
         .filter_map(|(v, rim)| rim.then_some(v))
@@ -281,7 +298,6 @@ pub fn distribute_touches(
             points
         }
     };
-    let (force, tip_radius) = tip;
     points
         .into_iter()
         .map(|at| Touch {
@@ -293,10 +309,23 @@ pub fn distribute_touches(
         .collect()
 }
 
+/// What is read of simulated touches.
+#[derive(Clone, Copy)]
+pub struct AskedSignals<'a> {
+    /// The kind of signal.
+    pub signal: Signal,
+    /// How many sites one after the other share a point: the first lies along the largest strain, the others are evenly
+    /// turned from it.
+    pub directions: usize,
+    /// Numbers of the touches for which it is found what gluing changes of a strain, and what it changes that they are made
+    /// otherwise.
+    pub slope_touches: &'a [usize],
+    /// As touches may be made.
+    pub making: &'a Making,
+}
+
 /// Simulates all touches and reads the signal at all sites. Gauge directions follow the strain over
-/// these very touches: of `directions` sites one after the other at the same point, the first lies along
-/// the largest and the others are evenly turned from it. Of strain, what gluing changes is found for the touches
-/// numbered in the list, and what changes as they are made otherwise.
+/// these very touches.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -304,11 +333,15 @@ pub fn simulate(
     model: &dyn Model,
     touches: Vec<Touch>,
     points: &[SurfacePoint],
-    signal: Signal,
-    directions: usize,
-    (slope_touches, making): (&[usize], &Making),
+    asked: &AskedSignals,
     watch: Watch,
 ) -> Result<Dataset, Cancelled> {
+    let AskedSignals {
+        signal,
+        directions,
+        slope_touches,
+        making,
+    } = *asked;
     let observer = model.observer(points, Face::Inside);
     let reading = match signal {
         Signal::Strain => Quantity::Strain,

@@ -35,7 +35,9 @@
 //! assert_eq!(simulated.dataset.x.columns(), simulated.dataset.touches.len());
 //!
 //! // Gauges, and their error on the reference model.
-//! let design = run_from(&inputs, simulated, &inputs.project.selectors(), &budget, &|| 0.0, &unwatched)?;
+//! let kinds = inputs.project.selectors();
+//! let asked = DesignRequest { inputs: &inputs, kinds: &kinds, budget: &budget };
+//! let design = run_from(&asked, simulated, &|| 0.0, &unwatched)?;
 //! let judged = design.chosen_row().ok_or("nothing was judged")?;
 //! assert!(design.chosen().len() == 3 && judged.error_mm < 5.0, "{} mm", judged.error_mm);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -30,8 +30,9 @@ use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
 use crate::uncertainty::{Gluing, HandPressing, Making, Uncertainty};
+use crate::units;
 
-use value::{MICRO, MM, is_default};
+use value::is_default;
 
 pub use axis::PartAxis;
 pub use gauge::{CalibrationKeys, GaugeKeys, ToleranceKeys};
@@ -158,16 +159,16 @@ impl Project {
         FeasibleRules {
             // Film and tape are about twice as wide as the grid.
             pad: grid_width,
-            support_clearance: self.feasible.support_clearance_mm * MM,
+            support_clearance: units::from_mm(self.feasible.support_clearance_mm),
             // Sites at one place are neighbours of each other, which move no centre of mass.
             edge_neighbours: (self.feasible.edge_neighbours + 1) * self.gauge.directions - 1,
-            edge_radius: self.feasible.edge_radius_mm * MM,
+            edge_radius: units::from_mm(self.feasible.edge_radius_mm),
             grid_length,
             grid_width,
-            flatness: self.gauge.flatness_mm * MM,
+            flatness: units::from_mm(self.gauge.flatness_mm),
             noise: self.uncertainty().of_channel(),
             least_signal_to_noise: self.gauge.least_signal_to_noise,
-            range: self.gauge.range_microstrain * MICRO,
+            range: units::from_microstrain(self.gauge.range_microstrain),
         }
     }
 
@@ -224,7 +225,7 @@ impl Project {
     pub fn gluing(&self) -> Gluing {
         let tolerance = &self.gauge.tolerance;
         Gluing {
-            place: tolerance.place_mm * MM,
+            place: units::from_mm(tolerance.place_mm),
             angle: tolerance.angle_deg * PI / 180.0,
             gain: tolerance.gain_percent / 100.0,
         }
@@ -234,7 +235,7 @@ impl Project {
     #[must_use]
     pub fn pressing(&self) -> HandPressing {
         HandPressing {
-            place: self.calibration.place_mm * MM,
+            place: units::from_mm(self.calibration.place_mm),
             force: self.calibration.force_percent / 100.0,
             friction: self.calibration.friction_percent / 100.0,
         }
@@ -244,7 +245,7 @@ impl Project {
     #[must_use]
     pub fn making(&self) -> Making {
         Making {
-            tip: self.touch.tip_tolerance_mm * MM,
+            tip: units::from_mm(self.touch.tip_tolerance_mm),
             friction: self.touch.friction_percent / 100.0,
         }
     }
@@ -255,13 +256,13 @@ impl Project {
     pub fn uncertainty(&self) -> Uncertainty {
         Uncertainty {
             noise: self.gauge.noise(),
-            resolution: self.gauge.resolution_microstrain * MICRO,
+            resolution: units::from_microstrain(self.gauge.resolution_microstrain),
             gluing: self.gluing(),
             model: self.live.model_error_of_any(),
             stiffness: self.live.stiffness_percent / 100.0,
             making: self.making(),
             allowed: self.live.friction_percent / 100.0,
-            drift: self.gauge.drift_microstrain * MICRO,
+            drift: units::from_microstrain(self.gauge.drift_microstrain),
             pressing: self.pressing(),
             ..Uncertainty::default()
         }
@@ -286,12 +287,12 @@ impl Project {
     /// Radius (m) of the ball that touches have to get to the part by.
     #[must_use]
     pub fn fingertip(&self) -> f64 {
-        self.touch.reach_mm * MM
+        units::from_mm(self.touch.reach_mm)
     }
 
     /// Force (N) and tip radius (m).
     #[must_use]
     pub fn tip(&self) -> (f64, f64) {
-        (self.touch.force_n, self.touch.tip_radius_mm * MM)
+        (self.touch.force_n, units::from_mm(self.touch.tip_radius_mm))
     }
 }

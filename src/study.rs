@@ -7,20 +7,20 @@ mod templates;
 
 use glam::DVec3;
 
-use crate::budget::Watch;
 use crate::dataset::SignalMatrix;
-use crate::evaluation::add_noise;
 use crate::gaussian_process::GpKernel;
+use crate::placement::SelectorKind;
 use crate::placement::expected_error::{Detail, SceneForces, SignalKnowledge, Variance};
 use crate::placement::greedy_svr::GreedySvr;
-use crate::placement::{Constraints, PlacementError, Pool, Selection, SelectorKind};
 use crate::plain;
 use crate::regression::folds::{Folds, number_of};
 use crate::regression::places::clumps;
 use crate::regression::{Grouping, Standardizer};
 use crate::statistics::median;
 
-pub use self::choice::{Choice, ChoiceSeconds, WeighedErrors, audit, select};
+pub use self::choice::{
+    Choice, ChoiceRequest, ChoiceSeconds, WeighedErrors, add_criteria, audit, select,
+};
 pub use self::judge::evaluate;
 pub use self::question::{Estimator, HeldOut, StudyQuestion, StudyVerdict};
 
@@ -101,44 +101,6 @@ fn usual_forces(forces: &[f64]) -> Option<[f64; 2]> {
 /// The force of each touch, where data say it.
 fn forces_of(data: &Data) -> Option<&[f64]> {
     (!data.forces.is_empty()).then_some(&data.forces[..])
-}
-
-/// Computes the criterion in mm of every set that has none, with the settings of greedy SVR; sets beyond
-/// the first that reaches the error asked for are dropped.
-///
-/// # Errors
-/// [`PlacementError`] for too few touches, or when the watch asks for a stop.
-pub fn add_criteria(
-    data: &Data,
-    selection: &mut Selection,
-    constraints: &Constraints,
-    settings: &ChoiceSettings,
-    watch: Watch,
-) -> Result<(), PlacementError> {
-    let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
-    let all: Vec<usize> = (0..noisy.rows()).collect();
-    let pool = Pool {
-        x: &noisy,
-        targets: &data.targets,
-        sites: &all,
-        positions: &data.positions,
-    };
-    let mut keep = selection.sets.len();
-    for (k, set) in selection.sets.iter_mut().enumerate() {
-        let error = match set.criterion_mm {
-            Some(error) => error,
-            None => settings
-                .svr
-                .criteria(&pool, std::slice::from_ref(&set.sites), watch)?[0],
-        };
-        set.criterion_mm = Some(error);
-        if constraints.target_mm.is_some_and(|t| error <= t) {
-            keep = k + 1;
-            break;
-        }
-    }
-    selection.sets.truncate(keep);
-    Ok(())
 }
 
 /// The fold that each touch is tested in, so that anyone can compute the criterion again.

@@ -14,7 +14,7 @@ mod sweep;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::Watch;
-use crate::design::{self, DesignError, Finest, Inputs, StageTime};
+use crate::design::{self, DesignError, DesignRequest, Finest, Inputs, StageTime};
 use crate::project::BadValue;
 use crate::units;
 
@@ -151,7 +151,12 @@ fn attempt(
     meter.forget_memory();
     let (cpu, clock) = (meter.cpu_seconds(), meter.seconds());
     let now = || meter.seconds();
-    let design = design::run(&inputs, &project.selectors(), &budget, &now, watch)?;
+    let asked = DesignRequest {
+        inputs: &inputs,
+        kinds: &project.selectors(),
+        budget: &budget,
+    };
+    let design = design::run(&asked, &now, watch)?;
     let own_mm = design.simulated.element_mm;
     if own_mm <= judge.element_mm() {
         return Err(BadValue {

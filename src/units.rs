@@ -29,6 +29,12 @@ pub fn cm3(volume: f64) -> f64 {
     volume * 1e6
 }
 
+/// Stiffness of a bedding (N/mm³) as pressure over a displacement (Pa/m).
+#[must_use]
+pub fn from_n_per_mm3(bedding: f64) -> f64 {
+    bedding * 1e9
+}
+
 /// Strain as microstrain.
 #[must_use]
 pub fn microstrain(strain: f64) -> f64 {
@@ -39,6 +45,24 @@ pub fn microstrain(strain: f64) -> f64 {
 #[must_use]
 pub fn from_microstrain(microstrain: f64) -> f64 {
     microstrain * 1e-6
+}
+
+/// A variance of strain as square microstrain.
+#[must_use]
+pub fn microstrain2(variance: f64) -> f64 {
+    variance * 1e12
+}
+
+/// What is per strain as per microstrain.
+#[must_use]
+pub fn per_microstrain(per_strain: f64) -> f64 {
+    per_strain * 1e-6
+}
+
+/// What is per square of strain (one over a variance) as per square microstrain.
+#[must_use]
+pub fn per_microstrain2(per_strain2: f64) -> f64 {
+    per_strain2 * 1e-12
 }
 
 /// Microseconds of a clock as seconds.
@@ -75,6 +99,12 @@ pub fn thousandths(value: f64) -> f64 {
 #[must_use]
 pub fn to_thousandths(value: f64) -> f64 {
     thousandths(value) / 1e3
+}
+
+/// A count in thousands.
+#[must_use]
+pub fn thousands(count: f64) -> f64 {
+    count / 1e3
 }
 
 /// Bytes as gigabytes.
@@ -130,7 +160,12 @@ mod tests {
         assert!((from_mm(mm(0.0123)) - 0.0123).abs() < 1e-15);
         assert_eq!(mm2(0.5), 5e5);
         assert_eq!(cm3(0.25), 250_000.0);
+        assert_eq!(from_n_per_mm3(5.0), 5e9);
         assert!((from_microstrain(microstrain(3e-4)) - 3e-4).abs() < 1e-15);
+        assert_eq!(microstrain2(4e-12), microstrain(2e-6) * microstrain(2e-6));
+        assert_eq!(per_microstrain(3e6), 3.0);
+        assert_eq!(per_microstrain2(4e12) * microstrain2(0.25e-12), 1.0);
+        assert_eq!(thousands(12_500.0), 12.5);
         assert_eq!(seconds_between(1_500_000, 3_000_000), 1.5);
         assert_eq!(seconds_between(3, 1), 0.0);
         assert_eq!(microseconds(1.5), 1_500_000);

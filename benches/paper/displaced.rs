@@ -44,7 +44,14 @@ impl Displaced {
         stages.end("filtering and reducing sites");
         let mut selections = Vec::new();
         for kind in SelectorKind::PAPER {
-            let chosen = design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched)?;
+            let chosen = design::Choosing {
+                inputs: &inputs,
+                simulated: &simulated,
+                reduced: &reduced,
+                budget: &budget,
+                watch: &unwatched,
+            }
+            .select(kind)?;
             selections.push(of_sizes(&chosen, &SIZES));
             stages.end(&format!("choosing by {}", kind.name()));
         }
@@ -99,17 +106,14 @@ impl Displaced {
         let model = self.simulated.model()?;
         let place = |&site: &usize| model.index().nearest(known.sites[site].gauge.position).0;
         let points: Vec<_> = finer.sites.iter().map(place).collect();
-        let slopes = (&[][..], &project.making());
+        let asked = dataset::AskedSignals {
+            signal: known.signal,
+            directions: 1,
+            slope_touches: &[],
+            making: &project.making(),
+        };
         let touches = finer.touches.clone();
-        let data = dataset::simulate(
-            &*model,
-            touches,
-            &points,
-            known.signal,
-            1,
-            slopes,
-            &unwatched,
-        )?;
+        let data = dataset::simulate(&*model, touches, &points, &asked, &unwatched)?;
         Ok(Reference {
             touches: data.touches,
             regions: finer.regions.clone(),
@@ -131,15 +135,14 @@ impl Displaced {
         reference: &Reference,
         budget: &Budget,
     ) -> Result<Evaluation, DesignError> {
-        design::evaluate(
-            &self.inputs,
-            &self.simulated,
-            &self.reduced,
-            selections,
-            reference,
+        design::Choosing {
+            inputs: &self.inputs,
+            simulated: &self.simulated,
+            reduced: &self.reduced,
             budget,
-            &unwatched,
-        )
+            watch: &unwatched,
+        }
+        .evaluate(selections, reference)
     }
 }
 

@@ -26,7 +26,14 @@ pub fn judged(displaced: &Displaced, stages: &mut Stages) -> Result<Evaluation, 
     // Each number of gauges is chosen for by itself: gauges are exchanged at the end.
     let mut select = |gauges: usize| -> Result<Selection, DesignError> {
         inputs.project.selection.sensors = gauges;
-        design::select(&inputs, &simulated, &reduced, SELECTOR, budget, &unwatched)
+        design::Choosing {
+            inputs: &inputs,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget,
+            watch: &unwatched,
+        }
+        .select(SELECTOR)
     };
     let (few, many) = (select(FEW)?, select(MANY)?);
     stages.end("choosing by expected error");
@@ -39,15 +46,14 @@ pub fn judged(displaced: &Displaced, stages: &mut Stages) -> Result<Evaluation, 
     let sites = design::sites_to_judge(EstimatorKind::Matching, &reduced, &selections);
     let reference = design::reference(&inputs, &simulated, &sites, budget, &unwatched)?;
     stages.end("measuring on a finer model");
-    let evaluation = design::evaluate(
-        &inputs,
-        &simulated,
-        &reduced,
-        &selections,
-        &reference,
+    let evaluation = design::Choosing {
+        inputs: &inputs,
+        simulated: &simulated,
+        reduced: &reduced,
         budget,
-        &unwatched,
-    )?;
+        watch: &unwatched,
+    }
+    .evaluate(&selections, &reference)?;
     stages.end("judging by matching");
     Ok(evaluation)
 }

@@ -21,7 +21,7 @@ use crate::board::{
     BoardOptions, GivenPress, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
 };
 use crate::budget::Watch;
-use crate::design::simulated_board::{options, places, simulated};
+use crate::design::simulated_board::{BoardRequest, options, places, simulated};
 use crate::design::{self, Inputs};
 use crate::inference::Chain;
 use crate::link::{Doorway, Entrance, Recorder, check_length, host, ports, record};
@@ -217,16 +217,14 @@ fn build(
         },
         ..usual
     };
-    Ok(simulated(
-        inputs,
-        &sensing,
-        args.workshop,
+    let asked = BoardRequest {
+        workshop: args.workshop,
         script,
-        args.gain.is_none().then_some(hardest),
+        hardest: args.gain.is_none().then_some(hardest),
         options,
-        plan.faults,
-        watch,
-    )?)
+        faults: plan.faults,
+    };
+    Ok(simulated(inputs, &sensing, asked, watch)?)
 }
 
 fn strongest(script: &PressScript) -> Option<f64> {

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::common::{Common, SelectorArg, prepare_folder};
 use super::{out, progress::Bar};
-use crate::design::{self, Design};
+use crate::design::{self, Design, DesignRequest};
 use crate::evaluation::{Chooser, EvaluationRow, MatchedRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
@@ -78,11 +78,14 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     let bar = Bar::default();
     let start = Instant::now();
     let inputs = loaded.inputs.clone();
+    let asked = DesignRequest {
+        inputs: &inputs,
+        kinds: &kinds,
+        budget: &budget,
+    };
     let design = args.common.in_pool(|| {
         let clock = || start.elapsed().as_secs_f64();
-        Ok(design::run(&inputs, &kinds, &budget, &clock, &|p| {
-            bar.show(p)
-        })?)
+        Ok(design::run(&asked, &clock, &|p| bar.show(p))?)
     });
     bar.finish();
     if design.is_err() && !existed {

@@ -96,14 +96,14 @@ fn choose_sites(
     let simulated = crate::design::simulate(&inputs, &budget, &unwatched)?;
     let feasibility = crate::design::filter(&inputs, &simulated);
     let reduced = crate::design::reduce_sites(&inputs, &simulated, &feasibility, &budget)?;
-    let selection = crate::design::select(
-        &inputs,
-        &simulated,
-        &reduced,
-        inputs.project.selection.selector,
-        &budget,
-        &unwatched,
-    )?;
+    let from = crate::design::Choosing {
+        inputs: &inputs,
+        simulated: &simulated,
+        reduced: &reduced,
+        budget: &budget,
+        watch: &unwatched,
+    };
+    let selection = from.select(inputs.project.selection.selector)?;
     let sites = selection.sets.last().map_or(&[][..], |s| &s.sites);
     Ok(crate::io::artifacts::as_chosen(
         &simulated.dataset.sites,

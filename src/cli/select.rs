@@ -20,7 +20,7 @@ use crate::placement::expected_error::Detail;
 use crate::placement::greedy_svr::{Audit, Comparison};
 use crate::placement::{Constraints, SelectorKind, SensorSet};
 use crate::plain;
-use crate::study::{self, Choice, ChoiceSettings, Data};
+use crate::study::{self, Choice, ChoiceRequest, ChoiceSettings, Data};
 
 #[derive(Args, Debug, Clone)]
 pub struct SelectArgs {
@@ -130,9 +130,15 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
     let kept_out = of_data.named(args.kept_out(&data))?;
     let bar = Bar::default();
     let watch = |p| bar.show(p);
+    let asked = ChoiceRequest {
+        data: &data,
+        kept_out: &kept_out,
+        constraints: &constraints,
+        settings: &settings,
+    };
     let result = args
         .criterion
-        .in_pool(|| of_data.named(args.chosen(&data, &kept_out, &constraints, &settings, &watch)));
+        .in_pool(|| of_data.named(args.chosen(&asked, &watch)));
     bar.finish();
     let (choice, criterion_seconds, audit) = result?;
     for step in &audit {
@@ -187,28 +193,17 @@ impl SelectArgs {
     /// The choice, the CPU time (s) of its criterion, and what was asked beside it.
     fn chosen(
         &self,
-        data: &Data,
-        kept_out: &[usize],
-        constraints: &Constraints,
-        settings: &ChoiceSettings,
+        asked: &ChoiceRequest,
         watch: Watch,
     ) -> anyhow::Result<(Choice, f64, Vec<Comparison>)> {
-        let mut choice = study::select(
-            data,
-            kept_out,
-            constraints,
-            settings,
-            &cpu_seconds,
-            watch,
-            &say,
-        )?;
+        let mut choice = study::select(asked, &cpu_seconds, watch, &say)?;
         let before = cpu_seconds();
         if !self.no_criterion {
-            study::add_criteria(data, &mut choice.selection, constraints, settings, watch)
+            study::add_criteria(asked, &mut choice.selection, watch)
                 .context("the criterion in mm (left out with --no-criterion)")?;
         }
         let criterion_seconds = cpu_seconds() - before;
-        let audit = self.audited(data, kept_out, &choice, settings, watch)?;
+        let audit = self.audited(asked, &choice, watch)?;
         Ok((choice, criterion_seconds, audit))
     }
 
@@ -224,10 +219,8 @@ impl SelectArgs {
 
     fn audited(
         &self,
-        data: &Data,
-        kept_out: &[usize],
+        asked: &ChoiceRequest,
         choice: &Choice,
-        settings: &ChoiceSettings,
         watch: Watch,
     ) -> anyhow::Result<Vec<Comparison>> {
         if self.audit == 0 {
@@ -236,11 +229,9 @@ impl SelectArgs {
         let audit = Audit {
             top: self.audit,
             random: self.audit,
-            seed: settings.svr.seed,
+            seed: asked.settings.svr.seed,
         };
-        Ok(study::audit(
-            data, kept_out, choice, settings, audit, watch,
-        )?)
+        Ok(study::audit(asked, choice, audit, watch)?)
     }
 
     /// That no flag is given in vain.

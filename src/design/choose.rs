@@ -111,28 +111,6 @@ pub struct Choosing<'a> {
     pub watch: Watch<'a>,
 }
 
-/// Runs one selector.
-///
-/// # Errors
-/// [`DesignError`] where the pool does not allow it.
-pub fn select(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    kind: SelectorKind,
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Selection, DesignError> {
-    let from = Choosing {
-        inputs,
-        simulated,
-        reduced,
-        budget,
-        watch,
-    };
-    from.select_step_by_step(kind, &|_, _, _| ())
-}
-
 /// What elements leave open of any criterion, as a share: a pick that leads by less than twice this may be another
 /// on other elements, and elements that are laid anew for a part may differ wherever the part differs at all. Zero
 /// for the part's own triangles, which stay as they are.
@@ -157,10 +135,18 @@ type ByGeometry<'a> =
     &'a dyn Fn(&Geometry, &Pool, &SelectionRequest) -> Result<Selection, PlacementError>;
 
 impl Choosing<'_> {
-    /// As [`select`], telling of every step.
+    /// Runs one selector.
     ///
     /// # Errors
-    /// As [`select`].
+    /// [`DesignError`] where the pool does not allow it.
+    pub fn select(&self, kind: SelectorKind) -> Result<Selection, DesignError> {
+        self.select_step_by_step(kind, &|_, _, _| ())
+    }
+
+    /// As [`Self::select`], telling of every step.
+    ///
+    /// # Errors
+    /// As [`Self::select`].
     pub fn select_step_by_step(
         &self,
         kind: SelectorKind,

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::judge::{JudgedOn, measured_by};
+use super::judge::{JudgedOn, Tried, measured_by};
 use super::layout::{lay_out_sites, touches_on};
 use super::{Design, DesignError, Inputs, Meshed, Reference, Simulated, ground};
 use crate::budget::{Budget, ElementBudget, Watch};
@@ -154,8 +154,11 @@ impl Finest {
         sites: &[usize],
         watch: Watch,
     ) -> Result<Reference, DesignError> {
-        let touches = self.touches.clone();
-        let reference = measured_by(&*self.model, inputs, simulated, sites, touches, None, watch)?;
+        let tried = Tried {
+            touches: self.touches.clone(),
+            presses: None,
+        };
+        let reference = measured_by(&*self.model, inputs, simulated, sites, tried, watch)?;
         Ok(Reference {
             element_mm: self.element_mm(),
             ..reference

@@ -7,6 +7,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::as_built::{WORKSHOPS, gains, of_workshop, sites_as_built};
+use super::choose::Choosing;
 use super::drawn::proposed;
 use super::known;
 use super::layout::test_touches;
@@ -46,12 +47,14 @@ pub fn reference(
 ) -> Result<Reference, DesignError> {
     let (meshed, model) = simulated.meshed.reference_model(watch)?;
     let mesh = meshed.touched_surface();
-    let touches = test_touches(&mesh, inputs, budget.test_touches)?;
-    let presses = match inputs.project.judging().estimator() {
-        EstimatorKind::Matching => Some(presses_on(&mesh, inputs)?),
-        EstimatorKind::Svr => None,
+    let tried = Tried {
+        touches: test_touches(&mesh, inputs, budget.test_touches)?,
+        presses: match inputs.project.judging().estimator() {
+            EstimatorKind::Matching => Some(presses_on(&mesh, inputs)?),
+            EstimatorKind::Svr => None,
+        },
     };
-    let mut reference = measured_by(&*model, inputs, simulated, sites, touches, presses, watch)?;
+    let mut reference = measured_by(&*model, inputs, simulated, sites, tried, watch)?;
     let work = model.system().work();
     reference.work += work;
     reference.element_mm = meshed.element_mm();
@@ -91,6 +94,13 @@ fn read(
     ))
 }
 
+/// What a set is tried on.
+pub(super) struct Tried {
+    pub touches: Vec<Touch>,
+    /// What it is calibrated with before.
+    pub presses: Option<Vec<Press>>,
+}
+
 /// Sites as a model reads them under touches and known presses: as drawn, and as workshops glue them. The size of its
 /// elements is for the caller to say.
 pub(super) fn measured_by(
@@ -98,8 +108,7 @@ pub(super) fn measured_by(
     inputs: &Inputs,
     simulated: &Simulated,
     sites: &[usize],
-    touches: Vec<Touch>,
-    presses: Option<Vec<Press>>,
+    Tried { touches, presses }: Tried,
     watch: Watch,
 ) -> Result<Reference, DesignError> {
     let (project, grid) = (&inputs.project, grid(&inputs.project));
@@ -181,49 +190,41 @@ impl<'a> OfWorkshops<'a> {
     }
 }
 
-/// Judges selections on the reference model by the project's estimator; by regression with all candidates as the baseline, where
-/// there are any.
-///
-/// # Errors
-/// [`DesignError`] when the watch asks for a stop, and as for the design's simulation.
-pub fn evaluate(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &ReducedSites,
-    selections: &[Selection],
-    reference: &Reference,
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Evaluation, DesignError> {
-    let row_of = |site: &usize| reference.sites.binary_search(site).ok();
-    let mut sets = Vec::new();
-    for selection in selections {
-        for set in &selection.sets {
-            sets.push(Candidate {
-                chooser: selection.selector.into(),
-                rows: set.sites.iter().filter_map(row_of).collect(),
-                hyper: None,
-            });
-        }
-    }
-    let all = reduced.candidate_sites();
-    if inputs.project.judging() == Judging::Svr && !all.is_empty() {
-        sets.push(Candidate {
-            chooser: Chooser::AllCandidates,
-            rows: all.iter().filter_map(row_of).collect(),
+impl Choosing<'_> {
+    /// Judges selections on the reference model by the project's estimator; by regression with all candidates as the
+    /// baseline, where there are any.
+    ///
+    /// # Errors
+    /// [`DesignError`] when the watch asks for a stop, and as for the design's simulation.
+    pub fn evaluate(
+        &self,
+        selections: &[Selection],
+        reference: &Reference,
+    ) -> Result<Evaluation, DesignError> {
+        let row_of = |site: &usize| reference.sites.binary_search(site).ok();
+        let set = |chooser, sites: &[usize]| Candidate {
+            chooser,
+            rows: sites.iter().filter_map(row_of).collect(),
             hyper: None,
-        });
+        };
+        let mut sets: Vec<Candidate> = (selections.iter())
+            .flat_map(|by| by.sets.iter().map(|s| set(by.selector.into(), &s.sites)))
+            .collect();
+        let all = self.reduced.candidate_sites();
+        if self.inputs.project.judging() == Judging::Svr && !all.is_empty() {
+            sets.push(set(Chooser::AllCandidates, &all));
+        }
+        let streams: Vec<u64> = (0..reference.sites.len() as u64).collect();
+        let on = JudgedOn {
+            inputs: self.inputs,
+            simulated: self.simulated,
+            reference,
+            streams: &streams,
+            budget: self.budget,
+            watch: self.watch,
+        };
+        on.judge_as_asked(&sets)
     }
-    let streams: Vec<u64> = (0..reference.sites.len() as u64).collect();
-    let on = JudgedOn {
-        inputs,
-        simulated,
-        reference,
-        streams: &streams,
-        budget,
-        watch,
-    };
-    on.judge_as_asked(&sets)
 }
 
 /// What sets are judged on: the same for all of them.

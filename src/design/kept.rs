@@ -7,7 +7,7 @@ use super::ground::{Ground, ground};
 use super::layout::lay_out_sites;
 use super::simulate::{Checks, JudgedElements, finish};
 use super::{DesignError, Inputs, Meshed, Simulated};
-use crate::budget::{Budget, Watch};
+use crate::budget::{Budget, Watch, Work};
 use crate::dataset::Dataset;
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
@@ -84,6 +84,8 @@ pub fn simulate_kept(
         linearity: kept.linearity,
         checks: kept.checks,
         is_short: false,
+        // Counted with what is kept.
+        work: Work::default(),
     };
     let read = (kept.dataset, kept.unknowns);
     finish(inputs, budget, known, read, &places, watch).map(Some)

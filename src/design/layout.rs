@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{DesignError, Inputs, LAYOUT, MOST_SITES, SaidBy, TEST_SEED};
 use crate::bounds::Bounds;
 use crate::budget::Budget;
-use crate::dataset::{self, GluingSlopes, Often, Signal, TouchRegion};
+use crate::dataset::{self, GluingSlopes, Often, Signal, TouchPattern, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::memory;
 use crate::mesh::reach::Finger;
@@ -222,8 +222,14 @@ pub(super) fn touches_on(
             times: project.touch.often_times,
         }),
     };
-    let tip = project.tip();
-    let touches = dataset::distribute_touches(mesh, count, seed, margin, even, tip, Some(&region));
+    let pattern = TouchPattern {
+        count,
+        seed,
+        margin,
+        even,
+        tip: project.tip(),
+    };
+    let touches = dataset::distribute_touches(mesh, &pattern, Some(&region));
     if touches.is_empty() {
         return Err(no_touches(mesh, inputs));
     }
@@ -280,17 +286,14 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
     let project = &inputs.project;
     let (seed, margin_mm) = (project.budget.seed, project.touch.edge_margin_mm);
     let region = project.touch.region.as_ref();
-    let anywhere = || {
-        dataset::distribute_touches(
-            mesh,
-            TRIED,
-            seed,
-            project.touch.edge_margin(),
-            false,
-            project.tip(),
-            None,
-        )
+    let pattern = TouchPattern {
+        count: TRIED,
+        seed,
+        margin: project.touch.edge_margin(),
+        even: false,
+        tip: project.tip(),
     };
+    let anywhere = || dataset::distribute_touches(mesh, &pattern, None);
     let mask = region.and_then(|name| inputs.masks.get(name));
     let remedy = if mask.is_some_and(|mask| !mask.contains(&true)) {
         "the region that touches come to (touch.region) is empty. Paint it, or take it out"

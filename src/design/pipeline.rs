@@ -6,8 +6,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    Choosing, DesignError, Inputs, OnFound, ReducedSites, Reference, Simulated, evaluate,
-    expected_errors, filter, reduce_sites, reference, refine, simulate, sites_to_judge,
+    Choosing, DesignError, DesignRequest, OnFound, ReducedSites, Reference, Simulated,
+    expected_errors, filter, reduce_sites, refine, simulate, sites_to_judge,
 };
 use crate::budget::{Budget, Watch, Work};
 use crate::evaluation::{Chooser, Evaluation, EvaluationRow, SetId};
@@ -267,16 +267,14 @@ fn named(selection: &Selection, words: &[String]) -> Vec<String> {
 /// # Errors
 /// [`DesignError`] from the stage that could not end.
 pub fn run(
-    inputs: &Inputs,
-    kinds: &[SelectorKind],
-    budget: &Budget,
+    asked: &DesignRequest,
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<Design, DesignError> {
     let mut times = Stopwatch::new(clock);
-    let simulated = Arc::new(simulate(inputs, budget, watch)?);
+    let simulated = Arc::new(simulate(asked.inputs, asked.budget, watch)?);
     times.lap("simulate");
-    let mut design = run_from(inputs, simulated, kinds, budget, clock, watch)?;
+    let mut design = run_from(asked, simulated, clock, watch)?;
     design.seconds.splice(0..0, times.stages);
     Ok(design)
 }
@@ -286,10 +284,8 @@ pub fn run(
 /// # Errors
 /// [`DesignError`] from the stage that could not end.
 pub fn run_from(
-    inputs: &Inputs,
+    asked: &DesignRequest,
     simulated: Arc<Simulated>,
-    kinds: &[SelectorKind],
-    budget: &Budget,
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<Design, DesignError> {
@@ -299,14 +295,7 @@ pub fn run_from(
         found: &|_, _, _| (),
         entered: &|_| (),
     };
-    run_step_by_step(
-        inputs,
-        simulated,
-        kinds,
-        budget,
-        KnownStages::default(),
-        &hooks,
-    )
+    run_step_by_step(asked, simulated, KnownStages::default(), &hooks)
 }
 
 /// As [`run_from`], from what is known already, telling of every step.
@@ -314,162 +303,167 @@ pub fn run_from(
 /// # Errors
 /// As [`run_from`].
 pub fn run_step_by_step(
-    inputs: &Inputs,
+    asked: &DesignRequest,
     simulated: Arc<Simulated>,
-    kinds: &[SelectorKind],
-    budget: &Budget,
     known: KnownStages,
     hooks: &Hooks,
 ) -> Result<Design, DesignError> {
-    let watch = hooks.watch;
-    let asked = inputs.project.selection.selector;
-    let chosen_by = *kinds
-        .iter()
-        .find(|k| **k == asked)
-        .or(kinds.first())
-        .unwrap_or(&asked);
-    let mut times = Stopwatch::new(hooks.clock);
-    (hooks.entered)(DesignStep::Reduce);
-    let (feasibility, reduced) = if let Some(known) = known.reduced {
-        known
-    } else {
-        let feasibility = filter(inputs, &simulated);
-        let reduced = reduce_sites(inputs, &simulated, &feasibility, budget)?;
-        times.lap("filter");
-        (Arc::new(feasibility), Arc::new(reduced))
+    let mut run = Run {
+        asked,
+        hooks,
+        times: Stopwatch::new(hooks.clock),
     };
-    let candidates = candidates(inputs, &reduced, kinds, &mut times, watch)?;
+    (hooks.entered)(DesignStep::Reduce);
+    let (feasibility, reduced) = match known.reduced {
+        Some(known) => known,
+        None => run.reduce(&simulated)?,
+    };
+    let candidates = run.candidates(&reduced)?;
     (hooks.entered)(DesignStep::Select);
-    let (simulated, selections) = if let Some(known) = known.selections {
-        (simulated, known)
-    } else {
-        let from = Choosing {
-            inputs,
-            simulated: &simulated,
-            reduced: &reduced,
-            budget,
-            watch,
-        };
-        let mut chosen = select_all(&from, kinds, &mut times, hooks.found)?;
-        let refined = finish_chosen(inputs, simulated, &reduced, &mut chosen, budget, hooks)?;
-        if inputs.project.selection.refine {
-            times.lap("refine places");
-        }
-        (refined, Arc::new(chosen))
+    let (simulated, selections) = match known.selections {
+        Some(known) => (simulated, known),
+        None => run.select(simulated, &reduced)?,
     };
     (hooks.entered)(DesignStep::Evaluate);
-    let judging = inputs.project.judging();
-    let by = judging.estimator();
-    let judged = sites_to_judge(by, &reduced, &selections);
-    let off = super::known::off(&inputs.project, &simulated);
-    let measured = (known.reference).filter(|t| {
-        let all = &simulated.dataset.sites;
-        t.measures(&judged, all, &off, &inputs.project)
-    });
-    let same = |e: &Arc<Evaluation>| measured.is_some() && e.judging == judging;
-    let known = known.evaluation.filter(same);
-    let reference = match measured {
-        Some(known) => Arc::new(known.in_regions_of(&inputs.project)),
-        None => Arc::new(reference(inputs, &simulated, &judged, budget, watch)?),
-    };
-    times.lap("truth");
-    let evaluation = match known {
-        Some(known) => known.in_regions(&reference.regions),
-        None => evaluate(
-            inputs,
-            &simulated,
-            &reduced,
-            &selections,
-            &reference,
-            budget,
-            watch,
-        )?,
-    };
-    times.lap("evaluate");
+    let from = asked.choosing(&simulated, &reduced, hooks.watch);
+    let (reference, evaluation) =
+        run.judge(&from, &selections, (known.reference, known.evaluation))?;
     Ok(Design {
-        budget: *budget,
+        budget: *asked.budget,
+        seconds: run.times.stages,
+        chosen_by: asked.chosen_by(),
+        by_hand: false,
         simulated,
         feasibility,
         reduced,
         candidates,
-        chosen_by,
-        by_hand: false,
         selections,
         reference,
-        evaluation: Arc::new(evaluation),
-        seconds: times.stages,
+        evaluation,
     })
 }
 
-/// The candidates, where somebody asks for them.
-fn candidates(
-    inputs: &Inputs,
-    reduced: &ReducedSites,
-    kinds: &[SelectorKind],
-    times: &mut Stopwatch,
-    watch: Watch,
-) -> Result<Option<Arc<Candidates>>, DesignError> {
-    if !inputs.project.wants_candidates(kinds) {
-        return Ok(None);
-    }
-    let known = !reduced.candidate_sites().is_empty();
-    let candidates = Arc::clone(reduced.candidates(watch)?);
-    if !known {
-        times.lap("reduce");
-    }
-    Ok(Some(candidates))
+/// A design on its way.
+struct Run<'a> {
+    asked: &'a DesignRequest<'a>,
+    hooks: &'a Hooks<'a>,
+    times: Stopwatch<'a>,
 }
 
-fn select_all(
-    from: &Choosing,
-    kinds: &[SelectorKind],
-    times: &mut Stopwatch,
-    found: OnFound,
-) -> Result<Vec<Selection>, DesignError> {
-    let mut selections = Vec::new();
-    for &kind in kinds {
-        selections.push(from.select_step_by_step(kind, found)?);
-        times.lap(match kind {
-            SelectorKind::GreedySvr => "select greedy-svr",
-            SelectorKind::PcaQr => "select pca-qr",
-            SelectorKind::Entropy => "select entropy",
-            SelectorKind::MutualInformation => "select mutual-information",
-            SelectorKind::ExpectedError => "select expected-error",
-        });
+impl Run<'_> {
+    fn reduce(
+        &mut self,
+        simulated: &Simulated,
+    ) -> Result<(Arc<Feasibility>, Arc<ReducedSites>), DesignError> {
+        let inputs = self.asked.inputs;
+        let feasibility = filter(inputs, simulated);
+        let reduced = reduce_sites(inputs, simulated, &feasibility, self.asked.budget)?;
+        self.times.lap("filter");
+        Ok((Arc::new(feasibility), Arc::new(reduced)))
     }
-    Ok(selections)
-}
 
-/// Moves the gauges chosen by expected error off the lattice, where that is asked for, and says what is expected of them over
-/// presses that they were not chosen by; the simulation with them.
-fn finish_chosen(
-    inputs: &Inputs,
-    simulated: Arc<Simulated>,
-    reduced: &ReducedSites,
-    chosen: &mut [Selection],
-    budget: &Budget,
-    hooks: &Hooks,
-) -> Result<Arc<Simulated>, DesignError> {
-    let kind = SelectorKind::ExpectedError;
-    let mut chosen = chosen.iter_mut().filter(|s| s.selector == kind);
-    let asked = inputs.project.selection.refine;
-    let Some(selection) = chosen.next() else {
-        return Ok(simulated);
-    };
-    let simulated = if asked {
-        refine(inputs, simulated, reduced, selection, budget, hooks.watch)?
-    } else {
-        simulated
-    };
-    if let Some(last) = selection.sets.last_mut() {
-        let sets = [last.sites.clone()];
-        let expected = expected_errors(inputs, &simulated, &sets, hooks.watch)?;
-        last.expected_mm = expected.first().copied();
-        if asked {
-            (hooks.found)(kind, last, &simulated.dataset.sites);
+    /// The candidates, where somebody asks for them.
+    fn candidates(
+        &mut self,
+        reduced: &ReducedSites,
+    ) -> Result<Option<Arc<Candidates>>, DesignError> {
+        let DesignRequest { inputs, kinds, .. } = self.asked;
+        if !inputs.project.wants_candidates(kinds) {
+            return Ok(None);
         }
+        let known = !reduced.candidate_sites().is_empty();
+        let candidates = Arc::clone(reduced.candidates(self.hooks.watch)?);
+        if !known {
+            self.times.lap("reduce");
+        }
+        Ok(Some(candidates))
     }
-    Ok(simulated)
+
+    /// What the selectors choose, and the simulation with the gauges that were moved off its lattice.
+    fn select(
+        &mut self,
+        simulated: Arc<Simulated>,
+        reduced: &ReducedSites,
+    ) -> Result<(Arc<Simulated>, Arc<Vec<Selection>>), DesignError> {
+        let from = (self.asked).choosing(&simulated, reduced, self.hooks.watch);
+        let mut chosen = Vec::new();
+        for &kind in self.asked.kinds {
+            chosen.push(from.select_step_by_step(kind, self.hooks.found)?);
+            self.times.lap(match kind {
+                SelectorKind::GreedySvr => "select greedy-svr",
+                SelectorKind::PcaQr => "select pca-qr",
+                SelectorKind::Entropy => "select entropy",
+                SelectorKind::MutualInformation => "select mutual-information",
+                SelectorKind::ExpectedError => "select expected-error",
+            });
+        }
+        let refined = self.finish_chosen(simulated, reduced, &mut chosen)?;
+        if self.asked.inputs.project.selection.refine {
+            self.times.lap("refine places");
+        }
+        Ok((refined, Arc::new(chosen)))
+    }
+
+    /// Moves the gauges chosen by expected error off the lattice, where that is asked for, and says what is expected of
+    /// them over presses that they were not chosen by; the simulation with them.
+    fn finish_chosen(
+        &self,
+        simulated: Arc<Simulated>,
+        reduced: &ReducedSites,
+        chosen: &mut [Selection],
+    ) -> Result<Arc<Simulated>, DesignError> {
+        let (kind, hooks) = (SelectorKind::ExpectedError, self.hooks);
+        let inputs = self.asked.inputs;
+        let mut chosen = chosen.iter_mut().filter(|s| s.selector == kind);
+        let is_refined = inputs.project.selection.refine;
+        let Some(selection) = chosen.next() else {
+            return Ok(simulated);
+        };
+        let simulated = if is_refined {
+            refine(self.asked, simulated, reduced, selection, hooks.watch)?
+        } else {
+            simulated
+        };
+        if let Some(last) = selection.sets.last_mut() {
+            let sets = [last.sites.clone()];
+            let expected = expected_errors(inputs, &simulated, &sets, hooks.watch)?;
+            last.expected_mm = expected.first().copied();
+            if is_refined {
+                (hooks.found)(kind, last, &simulated.dataset.sites);
+            }
+        }
+        Ok(simulated)
+    }
+
+    /// What the judge's model reads, and what it finds; what is known of both is taken where it is of the same.
+    fn judge(
+        &mut self,
+        from: &Choosing,
+        selections: &[Selection],
+        (reference, evaluation): (Option<Arc<Reference>>, Option<Arc<Evaluation>>),
+    ) -> Result<(Arc<Reference>, Arc<Evaluation>), DesignError> {
+        let (inputs, simulated) = (from.inputs, from.simulated);
+        let judging = inputs.project.judging();
+        let judged = sites_to_judge(judging.estimator(), from.reduced, selections);
+        let off = super::known::off(&inputs.project, simulated);
+        let measured = reference.filter(|t| {
+            let all = &simulated.dataset.sites;
+            t.measures(&judged, all, &off, &inputs.project)
+        });
+        let is_same = |e: &Arc<Evaluation>| measured.is_some() && e.judging == judging;
+        let known = evaluation.filter(is_same);
+        let reference = match measured {
+            Some(known) => known.in_regions_of(&inputs.project),
+            None => super::reference(inputs, simulated, &judged, from.budget, from.watch)?,
+        };
+        self.times.lap("truth");
+        let evaluation = match known {
+            Some(known) => known.in_regions(&reference.regions),
+            None => from.evaluate(selections, &reference)?,
+        };
+        self.times.lap("evaluate");
+        Ok((Arc::new(reference), Arc::new(evaluation)))
+    }
 }
 
 struct Stopwatch<'a> {

@@ -23,8 +23,8 @@ use glam::DVec3;
 
 use self::room::GaugeRoom;
 use super::known::{FINE, KnownSimulation, detail};
-use super::{Choosing, DesignError, Inputs, ReducedSites, Simulated};
-use crate::budget::{Budget, Cancelled, Watch, Work, report};
+use super::{Choosing, DesignError, DesignRequest, ReducedSites, Simulated};
+use crate::budget::{Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
 use crate::elasticity::Touch;
 use crate::elasticity::respond::PressedModel;
@@ -58,11 +58,10 @@ const CONFIRM_SEED: u64 = 0xc0f1;
 /// # Errors
 /// [`DesignError`] when the watch asks for a stop, and as for the design's simulation.
 pub fn refine(
-    inputs: &Inputs,
+    asked: &DesignRequest,
     simulated: Arc<Simulated>,
     reduced: &ReducedSites,
     selection: &mut Selection,
-    budget: &Budget,
     watch: Watch,
 ) -> Result<Arc<Simulated>, DesignError> {
     let Some(set) = selection.sets.last_mut() else {
@@ -75,13 +74,7 @@ pub fn refine(
         );
         return Ok(simulated);
     }
-    let from = Choosing {
-        inputs,
-        simulated: &simulated,
-        reduced,
-        budget,
-        watch,
-    };
+    let from = asked.choosing(&simulated, reduced, watch);
     let refined = search(&from, &set.sites)?;
     selection.achieved.effort += refined.work;
     let moved: Vec<&MovingGauge> = refined.gauges.iter().filter(|g| g.moved).collect();

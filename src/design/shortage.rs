@@ -2,7 +2,7 @@
 
 use super::inputs::Inputs;
 use crate::feasible::{Blame, Feasibility, Filter};
-use crate::plain;
+use crate::{plain, units};
 
 /// Fewer sites are feasible than gauges were asked for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -85,11 +85,9 @@ fn taken_in_words(inputs: &Inputs, feasibility: &Feasibility) -> String {
 
 /// What to change, and to what.
 fn remedy(inputs: &Inputs, blame: &Blame) -> String {
-    const MM: f64 = 1e3;
-    const MICRO: f64 = 1e6;
     let project = &inputs.project;
     let (gauge, room) = (&project.gauge, &project.feasible);
-    let limit = |by: f64| blame.limit.unwrap_or(f64::NAN) * by;
+    let limit = blame.limit.unwrap_or(f64::NAN);
     let change = match blame.filter {
         Filter::NotBehind => {
             "paint the inside (part.inside) where walls that can be touched have their back, or lower touch.reach_mm: few places lie behind what a fingertip reaches".to_owned()
@@ -98,17 +96,17 @@ fn remedy(inputs: &Inputs, blame: &Blame) -> String {
             "take a narrower gauge (gauge.grid_width_mm is {}): a pad twice as wide as its grid, {} mm, cannot be brought to the wall; one for {} mm can",
             gauge.grid_width_mm,
             2.0 * gauge.grid_width_mm,
-            down(limit(MM))
+            down(units::mm(limit))
         ),
         Filter::SupportClearance => format!(
             "lower feasible.support_clearance_mm from {} to {}, or make the supports smaller",
             room.support_clearance_mm,
-            down(limit(MM))
+            down(units::mm(limit))
         ),
         Filter::Edge => format!(
             "raise feasible.edge_radius_mm from {} to {}, or lower feasible.edge_neighbours ({}) or sites.spacing_mm ({})",
             room.edge_radius_mm,
-            up(limit(MM)),
+            up(units::mm(limit)),
             room.edge_neighbours,
             project.sites.spacing_mm
         ),
@@ -119,21 +117,21 @@ fn remedy(inputs: &Inputs, blame: &Blame) -> String {
         Filter::Flatness => format!(
             "raise gauge.flatness_mm from {} to {}, or take a smaller gauge (gauge.grid_length_mm is {}): the wall is curved under it",
             gauge.flatness_mm,
-            up(limit(MM)),
+            up(units::mm(limit)),
             gauge.grid_length_mm
         ),
         Filter::Noise => format!(
             "lower gauge.least_signal_to_noise from {} to {}, lower gauge.noise_microstrain ({}) or press harder (touch.force_n is {}): the signals are {} microstrain",
             gauge.least_signal_to_noise,
-            down(limit(MICRO) / gauge.noise_microstrain),
+            down(units::microstrain(limit) / gauge.noise_microstrain),
             gauge.noise_microstrain,
             project.touch.force_n,
-            down(limit(MICRO))
+            down(units::microstrain(limit))
         ),
         Filter::Range => format!(
             "raise gauge.range_microstrain from {} to {}, or press less hard (touch.force_n is {})",
             gauge.range_microstrain,
-            up(limit(MICRO)),
+            up(units::microstrain(limit)),
             project.touch.force_n
         ),
         Filter::Jig => "switch feasible.jig off and press some gauges by hand, or choose a part with a straight way in".to_owned(),

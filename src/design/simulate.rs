@@ -14,7 +14,7 @@ use super::nearness::{Nearness, check_reach};
 use super::on_supports::on_supports;
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
-use crate::dataset::{self, Dataset, Surveyed};
+use crate::dataset::{self, AskedSignals, Dataset, Surveyed};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::{DofSet, Model, Touch};
@@ -163,17 +163,15 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         linearity,
         checks,
         is_short,
+        // The last model is counted with the dataset.
+        work: Work {
+            assemblies: models - 1,
+            factorizations: models - 1,
+            solves,
+            ..Work::default()
+        },
     };
-    // The last model is counted with the dataset.
-    let before = Work {
-        assemblies: models - 1,
-        factorizations: models - 1,
-        solves,
-        ..Work::default()
-    };
-    read(
-        inputs, budget, known, &*model, touches, &places, before, watch,
-    )
+    read(inputs, budget, known, &*model, (touches, &places), watch)
 }
 
 /// Refuses gauges that are required farther from the part than it is large.
@@ -232,13 +230,11 @@ pub fn simulate_again(
         linearity: last.linearity,
         checks: last.checks,
         is_short: last.is_short,
+        work: Work::default(),
     };
     let model = last.meshed.model(watch)?;
     let touches = last.dataset.touches.clone();
-    let before = Work::default();
-    read(
-        inputs, budget, known, &*model, touches, &places, before, watch,
-    )
+    read(inputs, budget, known, &*model, (touches, &places), watch)
 }
 
 /// Elements with what is known of them.
@@ -249,33 +245,30 @@ pub(super) struct JudgedElements {
     pub checks: Checks,
     /// Whether memory did not hold as many as were asked for.
     pub is_short: bool,
+    /// What laying and judging them took.
+    pub work: Work,
 }
 
 /// What sites at some places (m) report of touches on a model, with everything that its reader must know.
-#[allow(
-    clippy::too_many_arguments,
-    reason = "the two ways here have all of it in hand"
-)]
 fn read(
     inputs: &Inputs,
     budget: &Budget,
     known: JudgedElements,
     model: &dyn Model,
-    touches: Vec<Touch>,
-    places: &[DVec3],
-    before: Work,
+    (touches, places): (Vec<Touch>, &[DVec3]),
     watch: Watch,
 ) -> Result<Simulated, DesignError> {
     let project = &inputs.project;
     let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index().nearest(p).0).collect();
     let unknowns = model.system().dimension();
-    let gauge = &project.gauge;
-    let (signal, directions) = (gauge.signal, gauge.directions);
-    let making = project.uncertainty().making_allowed();
-    let changes = (&evenly(touches.len(), SLOPE_TOUCHES)[..], &making);
-    let mut dataset =
-        dataset::simulate(model, touches, &points, signal, directions, changes, watch)?;
-    dataset.work += before;
+    let asked = AskedSignals {
+        signal: project.gauge.signal,
+        directions: project.gauge.directions,
+        slope_touches: &evenly(touches.len(), SLOPE_TOUCHES),
+        making: &project.uncertainty().making_allowed(),
+    };
+    let mut dataset = dataset::simulate(model, touches, &points, &asked, watch)?;
+    dataset.work += known.work;
     finish(inputs, budget, known, (dataset, unknowns), places, watch)
 }
 
@@ -294,6 +287,7 @@ pub(super) fn finish(
         linearity,
         checks,
         is_short,
+        ..
     } = known;
     let project = &inputs.project;
     let mut notes = if dataset.touches.len() < project.touch.count {

@@ -53,21 +53,37 @@ pub fn places(inputs: &Inputs, sensing: &Sensing, seed: u64) -> Result<Vec<Touch
     sensing.touches(inputs, PLACES, seed.wrapping_add(SEED), false)
 }
 
-/// A board whose gain suits touches up to a force (N).
+/// A simulated board as it is asked for.
+pub struct BoardRequest {
+    /// How its gauges are glued.
+    pub workshop: Workshop,
+    /// Who presses, and where.
+    pub script: PressScript,
+    /// The hardest touch (N) that its gain is to suit; absent where the gain of the options stays.
+    pub hardest: Option<f64>,
+    /// What it is like.
+    pub options: BoardOptions,
+    /// What goes wrong on the wire.
+    pub faults: Faults,
+}
+
+/// The board that is asked for.
 ///
 /// # Errors
 /// As [`Sensing::reference`].
-#[allow(clippy::too_many_arguments)]
 pub fn simulated(
     inputs: &Inputs,
     sensing: &Sensing,
-    workshop: Workshop,
-    script: PressScript,
-    hardest: Option<f64>,
-    mut options: BoardOptions,
-    faults: Faults,
+    asked: BoardRequest,
     watch: Watch,
 ) -> Result<SimulatedBoard, DesignError> {
+    let BoardRequest {
+        workshop,
+        script,
+        hardest,
+        mut options,
+        faults,
+    } = asked;
     let seed = inputs.project.budget.seed;
     let (reference, gains) =
         sensing.reference(inputs, &workshop.of(inputs.project.gluing()), seed, watch)?;

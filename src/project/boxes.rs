@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::value::MM;
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::stance::Stance;
+use crate::units;
 
 /// What lies so near to a face is on it (m): corners in decimals are not exactly what they say.
 const ON_FACE: f64 = 1e-9;
@@ -14,7 +14,7 @@ const ON_FACE: f64 = 1e-9;
 /// and the up of a part of that axis.
 #[must_use]
 pub fn oriented(corners: &BoxMm, axis: Option<[f64; 3]>) -> OrientedBox {
-    let [a, b] = corners.map(|corner| DVec3::from_array(corner) * MM);
+    let [a, b] = corners.map(|corner| units::from_mm(DVec3::from_array(corner)));
     let stance = axis.map_or_else(Stance::default, |axis| {
         Stance::about(DVec3::from_array(axis))
     });

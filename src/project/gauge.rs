@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::key::{ValueRange, from};
 use super::keys::keys;
 use super::ranges::{FRICTION, LENGTH, OFF_MM, OFF_PERCENT, ROOM};
-use super::value::{MICRO, MM, any, is_default};
+use super::value::{any, is_default};
 use crate::dataset::Signal;
+use crate::units;
 
 any!(Signal);
 
@@ -52,13 +53,13 @@ impl GaugeKeys {
     /// Length and width of the measuring grid (m).
     #[must_use]
     pub fn grid(&self) -> [f64; 2] {
-        [self.grid_length_mm, self.grid_width_mm].map(|mm| mm * MM)
+        [self.grid_length_mm, self.grid_width_mm].map(units::from_mm)
     }
 
     /// Standard deviation of a reading, a strain.
     #[must_use]
     pub fn noise(&self) -> f64 {
-        self.noise_microstrain * MICRO
+        units::from_microstrain(self.noise_microstrain)
     }
 }
 

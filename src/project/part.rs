@@ -7,11 +7,12 @@ use super::boxes;
 use super::key::{MASK, ValueRange, from, within};
 use super::keys::keys;
 use super::ranges::{LENGTH, PLACES, ROOM};
-use super::value::{MM, any};
+use super::value::any;
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
+use crate::units;
 
 any!(Unit, ElementKind, PartModel, SupportKind, Axis);
 
@@ -113,18 +114,18 @@ impl Part {
     /// Of the wall of a shell (m).
     #[must_use]
     pub fn thickness(&self) -> f64 {
-        self.thickness_mm * MM
+        units::from_mm(self.thickness_mm)
     }
 
     /// The repairs asked for when the mesh is read.
     #[must_use]
     pub fn repair(&self) -> Repair {
         Repair {
-            weld: self.weld_mm * MM,
-            fill_holes: self.fill_holes_mm * MM,
-            straighten: self.straighten_mm * MM,
+            weld: units::from_mm(self.weld_mm),
+            fill_holes: units::from_mm(self.fill_holes_mm),
+            straighten: units::from_mm(self.straighten_mm),
             halve: match self.elements {
-                ElementKind::Graded => self.halve_mm * MM,
+                ElementKind::Graded => units::from_mm(self.halve_mm),
                 // Those of the file are the elements.
                 ElementKind::AsGiven => f64::INFINITY,
             },
@@ -209,12 +210,10 @@ impl SupportKeys {
     /// See [`crate::elasticity::Support::bedding`] (Pa/m). A mirror plane does not give way.
     #[must_use]
     pub fn bedding(&self) -> Option<f64> {
-        /// N/mm³.
-        const UNIT: f64 = 1e9;
         let of = self
             .bedding_n_per_mm3
             .filter(|_| self.kind != SupportKind::Symmetry);
-        of.map(|bedding| bedding * UNIT)
+        of.map(units::from_n_per_mm3)
     }
 
     /// Clamps what lies inside a box.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::key::{SWITCH, ValueRange, above, from};
 use super::keys::keys;
 use super::ranges::PLACES;
-use super::value::{MICRO, MM};
+use crate::units;
 use crate::wire::MOST_CHANNELS;
 
 keys! {
@@ -40,10 +40,16 @@ impl PressKeys {
     /// A press at a place (m), of a force (N), with what each gauge read (strain): no number where it was not trusted.
     #[must_use]
     pub fn new(at: DVec3, force_n: f64, reading: &[f64]) -> Self {
-        let trusted = |x: &f64| if x.is_finite() { x / MICRO } else { 0.0 };
+        let trusted = |x: &f64| {
+            if x.is_finite() {
+                units::microstrain(*x)
+            } else {
+                0.0
+            }
+        };
         let untrusted = reading.iter().enumerate().filter(|(_, x)| !x.is_finite());
         Self {
-            position_mm: (at / MM).to_array(),
+            position_mm: units::mm(at).to_array(),
             force_n,
             reading_microstrain: reading.iter().map(trusted).collect(),
             untrusted: untrusted.map(|(gauge, _)| gauge).collect(),
@@ -55,7 +61,7 @@ impl PressKeys {
     /// Where it was asked for (m).
     #[must_use]
     pub fn position(&self) -> DVec3 {
-        DVec3::from_array(self.position_mm) * MM
+        units::from_mm(DVec3::from_array(self.position_mm))
     }
 
     /// What each gauge read (strain); no number where it was not trusted.
@@ -66,7 +72,7 @@ impl PressKeys {
             if self.untrusted.contains(&gauge) {
                 f64::NAN
             } else {
-                x * MICRO
+                units::from_microstrain(*x)
             }
         })
         .collect()

@@ -7,13 +7,14 @@ use super::boxes;
 use super::key::{SWITCH, ValueRange, from};
 use super::keys::keys;
 use super::ranges::{GAUGES, LENGTH, PLACES, ROOM};
-use super::value::{MM, any};
+use super::value::any;
 use crate::evaluation::failures::MOST_FAILED;
 use crate::gaussian_process::GpKernel;
 use crate::limb::BoxMm;
 use crate::placement::SelectorKind;
 use crate::placement::constraints::{Loss, LostBy, Thorough};
 use crate::regression::Hyper;
+use crate::units;
 
 any!(SelectorKind, LostBy);
 
@@ -79,13 +80,13 @@ keys! {
 impl SelectionKeys {
     /// Where gauges must be (m).
     pub fn required(&self) -> impl Iterator<Item = DVec3> {
-        (self.required_mm.iter()).map(|place| DVec3::from_array(*place) * MM)
+        (self.required_mm.iter()).map(|place| units::from_mm(DVec3::from_array(*place)))
     }
 
     /// The least distance between gauges (m).
     #[must_use]
     pub fn spacing(&self) -> f64 {
-        self.spacing_mm * MM
+        units::from_mm(self.spacing_mm)
     }
 
     /// What a gauge costs at each position (m).
@@ -134,7 +135,7 @@ impl GaussianProcessKeys {
         let paper = GpKernel::default();
         (self.length_mm.is_some() || self.power.is_some()).then(|| {
             (
-                self.length_mm.map_or(paper.length_m, |l| l * MM),
+                self.length_mm.map_or(paper.length_m, units::from_mm),
                 self.power.unwrap_or(paper.power),
             )
         })
@@ -172,6 +173,6 @@ impl ChosenSite {
     /// The middle of the gauge (m).
     #[must_use]
     pub fn position(&self) -> DVec3 {
-        DVec3::from_array(self.position_mm) * MM
+        units::from_mm(DVec3::from_array(self.position_mm))
     }
 }

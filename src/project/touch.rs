@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::key::{MASK, SWITCH, ValueRange, from};
 use super::keys::keys;
 use super::ranges::{FORCES, FRICTION, LENGTH, OFF_MM, ROOM};
-use super::value::{MM, any, is_default};
+use super::value::{any, is_default};
 use crate::mesh::reach::FINGERTIP;
+use crate::units;
 
 keys! {
     /// Keys of the table `touch`.
@@ -50,7 +51,7 @@ impl TouchKeys {
     /// How far touches keep from edges (m).
     #[must_use]
     pub fn edge_margin(&self) -> f64 {
-        self.edge_margin_mm * MM
+        units::from_mm(self.edge_margin_mm)
     }
 }
 
@@ -111,7 +112,7 @@ impl SiteKeys {
     /// Between possible gauges (m).
     #[must_use]
     pub fn spacing(&self) -> f64 {
-        self.spacing_mm * MM
+        units::from_mm(self.spacing_mm)
     }
 }
 

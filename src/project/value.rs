@@ -6,9 +6,6 @@ use serde::Serialize;
 
 use super::key::{Key, ValueRange, number};
 
-pub(super) const MM: f64 = 1e-3;
-pub(super) const MICRO: f64 = 1e-6;
-
 /// A value that cannot be used, by the key it stands under.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key} must be {rule}, but is {value}")]

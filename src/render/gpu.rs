@@ -1,6 +1,7 @@
 //! The wgpu side: draws the limb into a target of its own (4× anti-aliased, with depth), which the window
 //! then copies. Nothing is uploaded or drawn again that has not changed.
 
+mod corners;
 mod data;
 mod pipelines;
 mod shade;
@@ -244,7 +245,11 @@ impl SlotGpu {
                 if Arc::ptr_eq(&known.shown, &frame.shown) {
                     return false;
                 }
-                queue.write_buffer(&known.changing, 0, bytemuck::cast_slice(&frame.shown));
+                queue.write_buffer(
+                    &known.changing,
+                    0,
+                    bytemuck::cast_slice(&frame.solid.spread(&frame.shown)),
+                );
                 known.shown = Arc::clone(&frame.shown);
             }
             _ => self.mesh = Some(MeshGpu::new(device, frame)),
@@ -325,7 +330,7 @@ impl MeshGpu {
             ),
             changing: buffer(
                 "limb fields",
-                bytemuck::cast_slice(&frame.shown),
+                bytemuck::cast_slice(&solid.spread(&frame.shown)),
                 wgpu::BufferUsages::VERTEX,
             ),
             indices: buffer(

@@ -11,7 +11,9 @@ use super::state::drive::{DriveGoal, RunningDesign};
 use super::state::results::{DesignResult, SimulationResult};
 use crate::budget::{Progress, Quality};
 use crate::dataset::Site;
-use crate::design::{self, Design, Hooks, Inputs, KnownStages, Simulated, StageTime};
+use crate::design::{
+    self, Design, DesignRequest, Hooks, Inputs, KnownStages, Simulated, StageTime,
+};
 use crate::io::artifacts::as_chosen;
 use crate::job::{Reporter, Stop};
 use crate::placement::{SelectorKind, SensorSet};
@@ -270,7 +272,6 @@ fn make(
 ) -> Result<Design, Stop> {
     let start = Instant::now();
     let first = inputs.project.selection.selector;
-    let kinds = inputs.project.selectors();
     let hooks = Hooks {
         clock: &|| start.elapsed().as_secs_f64(),
         watch: &|p: Progress| r.report(p),
@@ -287,7 +288,10 @@ fn make(
             }
         },
     };
-    let budget = inputs.project.budget.budget_at(quality);
-    design::run_step_by_step(inputs, simulated, &kinds, &budget, known, &hooks)
-        .map_err(|e| stop(&e))
+    let asked = DesignRequest {
+        inputs,
+        kinds: &inputs.project.selectors(),
+        budget: &inputs.project.budget.budget_at(quality),
+    };
+    design::run_step_by_step(&asked, simulated, known, &hooks).map_err(|e| stop(&e))
 }

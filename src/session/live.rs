@@ -22,7 +22,7 @@ use super::state::live::Target;
 use crate::board::{
     ChannelFault, Faults, Illness, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
 };
-use crate::design::simulated_board::{options, places, simulated};
+use crate::design::simulated_board::{BoardRequest, options, places, simulated};
 use crate::design::{Inputs, Sensing, Workshop};
 use crate::document::SensingInputs;
 use crate::io::kept_model;
@@ -319,17 +319,14 @@ fn board(inputs: &Inputs, sensing: &Sensing, r: &Reporter) -> Result<SimulatedBo
         RandomPresses::usual(FORCES_N, inputs.project.making()),
         script_seed(seed),
     );
-    let made = simulated(
-        inputs,
-        sensing,
-        Workshop::All,
+    let asked = BoardRequest {
+        workshop: Workshop::All,
         script,
-        Some(FORCES_N[1]),
-        options(inputs, sensing.gauges.len()),
-        Faults::default(),
-        &|p| r.report(p),
-    );
-    made.map_err(|e| stop(&e))
+        hardest: Some(FORCES_N[1]),
+        options: options(inputs, sensing.gauges.len()),
+        faults: Faults::default(),
+    };
+    simulated(inputs, sensing, asked, &|p| r.report(p)).map_err(|e| stop(&e))
 }
 
 fn doorway() -> Doorway {

@@ -25,20 +25,18 @@ pub(super) fn number(ui: &mut Ui, label: &str, value: &mut f64, key: &Key, speed
         label,
         value,
         key.numbers(),
-        speed,
-        key.unit,
+        (speed, key.unit),
         &key.sentence(),
     );
 }
 
-/// One row: a label and any number.
+/// One row: a label and any number, with what dragging changes it by and its unit.
 pub(super) fn quantity(
     ui: &mut Ui,
     label: &str,
     value: &mut f64,
     range: RangeInclusive<f64>,
-    speed: f64,
-    unit: &str,
+    (speed, unit): (f64, &str),
     help: &str,
 ) {
     let name = ui.label(label);
@@ -68,7 +66,7 @@ pub(super) fn percentage(ui: &mut Ui, label: &str, share: &mut f64, key: &Key) {
     let mut percent = 100.0 * *share;
     let shares = key.numbers();
     let range = 100.0 * shares.start()..=100.0 * shares.end();
-    quantity(ui, label, &mut percent, range, 0.05, "%", &key.sentence());
+    quantity(ui, label, &mut percent, range, (0.05, "%"), &key.sentence());
     // Not every frame: a hundredfold and back is not always the same number.
     if (percent - 100.0 * *share).abs() > 0.0 {
         *share = percent / 100.0;

@@ -43,6 +43,7 @@ impl Unrolled {
             vertices: vertices.collect(),
             triangles: flat.triangles.clone(),
             edges: Vec::new(),
+            again: Vec::new(),
         };
         Self {
             solid: Arc::new(solid),

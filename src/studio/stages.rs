@@ -364,6 +364,27 @@ mod tests {
     use crate::session::Wake;
 
     #[test]
+    fn what_is_foreseen_is_said_in_the_unit_that_it_has() {
+        let loaded = opening::bundled().unwrap();
+        let inputs = loaded.inputs.clone();
+        let session = Session::new(Document::new(loaded, None), Wake::default());
+        let (_, _, bytes) = design::expected_size(&inputs, &session.budget());
+        let lines = simulation_lines(&session);
+        let (value, unit) = match bytes {
+            ..1e8 => (bytes / 1e6, "MB"),
+            _ => (bytes / 1e9, "GB"),
+        };
+        let said = lines[0]
+            .rsplit(", ")
+            .next()
+            .and_then(|s| s.split_once(' '))
+            .unwrap();
+        let number: f64 = said.0.parse().unwrap();
+        assert_eq!(said.1, unit);
+        assert!((number - value).abs() <= 0.5, "{lines:?}: {bytes}");
+    }
+
+    #[test]
     fn a_vertex_far_away_is_named_at_the_part_and_nothing_is_foreseen() {
         let usual = opening::bundled().unwrap();
         let mut loaded = opening::bundled().unwrap();

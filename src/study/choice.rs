@@ -61,19 +61,35 @@ pub struct ChoiceSeconds {
     pub selection: f64,
 }
 
-/// Chooses among all sites but those kept out.
+/// What is chosen from, and how: all sites but those kept out.
+#[derive(Clone, Copy)]
+pub struct ChoiceRequest<'a> {
+    /// The signals, with where they are and what they are of.
+    pub data: &'a Data,
+    /// Sites that may not be chosen.
+    pub kept_out: &'a [usize],
+    /// What is asked of the choice.
+    pub constraints: &'a Constraints,
+    /// By whom, and at what effort.
+    pub settings: &'a ChoiceSettings,
+}
+
+/// Chooses.
 ///
 /// # Errors
 /// [`PlacementError`] where the data or the constraints do not allow it.
 pub fn select(
-    data: &Data,
-    kept_out: &[usize],
-    constraints: &Constraints,
-    settings: &ChoiceSettings,
+    asked: &ChoiceRequest,
     clock: &dyn Fn() -> f64,
     watch: Watch,
     found: &(dyn Fn(&SensorSet) + Sync),
 ) -> Result<Choice, PlacementError> {
+    let ChoiceRequest {
+        data,
+        kept_out,
+        constraints,
+        settings,
+    } = *asked;
     enough_touches(data, settings)?;
     let offer = AskedSites::new(data, kept_out, constraints, settings)?;
     let pool = Pool {
@@ -87,9 +103,7 @@ pub fn select(
         watch,
         found,
     };
-    let located = |seconds: &mut ChoiceSeconds| {
-        straight(&pool, data, kept_out, settings, clock, seconds, watch)
-    };
+    let located = |seconds: &mut ChoiceSeconds| straight(asked, &pool, clock, seconds, watch);
     match settings.kind {
         SelectorKind::Entropy => by_geometry(located, clock, &|geometry| {
             Entropy { geometry }.select(&pool, &request)
@@ -298,16 +312,15 @@ const NO_NOISE: &str =
 /// A geometry of straight lines: without a mesh nobody knows the way over the surface. Sites that are
 /// kept out still count as locations.
 fn straight(
+    asked: &ChoiceRequest,
     pool: &Pool,
-    data: &Data,
-    kept_out: &[usize],
-    settings: &ChoiceSettings,
     clock: &dyn Fn() -> f64,
     seconds: &mut ChoiceSeconds,
     watch: Watch,
 ) -> Result<Geometry, PlacementError> {
     /// Locations nearer than this share of the whole are one.
     const SAME: f64 = 1e-6;
+    let settings = asked.settings;
     if pool.positions.is_empty() {
         return Err(PlacementError::Constraint {
             what: "entropy and mutual information need the positions of the sites (site_m)",
@@ -315,7 +328,8 @@ fn straight(
     }
     let before = clock();
     let mut places = pool.positions.to_vec();
-    places.extend(kept_out.iter().filter_map(|&s| data.positions.get(s)));
+    let kept_out = asked.kept_out.iter();
+    places.extend(kept_out.filter_map(|&s| asked.data.positions.get(s)));
     let n = places.len();
     let measured: Vec<f64> = places
         .iter()
@@ -348,22 +362,59 @@ fn straight(
     })
 }
 
+/// Computes the criterion in mm of every set that has none, with the settings of greedy SVR; sets beyond
+/// the first that reaches the error asked for are dropped.
+///
+/// # Errors
+/// [`PlacementError`] for too few touches, or when the watch asks for a stop.
+pub fn add_criteria(
+    asked: &ChoiceRequest,
+    selection: &mut Selection,
+    watch: Watch,
+) -> Result<(), PlacementError> {
+    let ChoiceRequest { data, settings, .. } = *asked;
+    let target_mm = asked.constraints.target_mm;
+    let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
+    let all: Vec<usize> = (0..noisy.rows()).collect();
+    let pool = Pool {
+        x: &noisy,
+        targets: &data.targets,
+        sites: &all,
+        positions: &data.positions,
+    };
+    let mut keep = selection.sets.len();
+    for (k, set) in selection.sets.iter_mut().enumerate() {
+        let error = match set.criterion_mm {
+            Some(error) => error,
+            None => settings
+                .svr
+                .criteria(&pool, std::slice::from_ref(&set.sites), watch)?[0],
+        };
+        set.criterion_mm = Some(error);
+        if target_mm.is_some_and(|t| error <= t) {
+            keep = k + 1;
+            break;
+        }
+    }
+    selection.sets.truncate(keep);
+    Ok(())
+}
+
 /// Compares each step of greedy SVR's choice with other sites, by the criterion itself; sites as numbered
 /// in the data.
 ///
 /// # Errors
 /// As [`select`].
 pub fn audit(
-    data: &Data,
-    kept_out: &[usize],
+    asked: &ChoiceRequest,
     choice: &Choice,
-    settings: &ChoiceSettings,
     audit: Audit,
     watch: Watch,
 ) -> Result<Vec<Comparison>, PlacementError> {
+    let ChoiceRequest { data, settings, .. } = *asked;
     let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
     let open: Vec<usize> = (0..noisy.rows())
-        .filter(|s| !kept_out.contains(s))
+        .filter(|s| !asked.kept_out.contains(s))
         .collect();
     let x = noisy.select_rows(&open);
     let pool = Pool {

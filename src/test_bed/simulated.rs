@@ -8,7 +8,7 @@ use crate::bench::{Collector, CollectorNews, ContactLaw, PrinterFaults, RunEnd, 
 use crate::board::{BoardOptions, Faults, PressScript, SimulatedBoard};
 use crate::budget::Watch;
 use crate::design::DesignError;
-use crate::design::simulated_board::{gives_way, options, simulated};
+use crate::design::simulated_board::{BoardRequest, gives_way, options, simulated};
 use crate::elasticity::Touch;
 use crate::link::{BenchOrder, press_simulated};
 
@@ -69,17 +69,14 @@ fn built(
         tip_n: ready.machine.sensor.map(|s| s.newton_per_count),
         ..options(inputs, sensing.gauges.len() + 1)
     };
-    let board = simulated(
-        inputs,
-        sensing,
-        flaws.workshop,
-        PressScript::Held(None, 0),
-        Some(ready.asked.most_force_n),
+    let asked = BoardRequest {
+        workshop: flaws.workshop,
+        script: PressScript::Held(None, 0),
+        hardest: Some(ready.asked.most_force_n),
         options,
-        Faults::default(),
-        watch,
-    )?;
-    Ok((gives, board))
+        faults: Faults::default(),
+    };
+    Ok((gives, simulated(inputs, sensing, asked, watch)?))
 }
 
 fn printer(ready: &Ready, flaws: &Flaws, left: usize) -> SimulatedPrinter {

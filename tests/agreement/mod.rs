@@ -62,8 +62,15 @@ impl Trial {
         let feasibility = design::filter(&inputs, &simulated);
         let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget()).unwrap();
         let kind = SelectorKind::ExpectedError;
-        let selection =
-            design::select(&inputs, &simulated, &reduced, kind, &budget(), &unwatched).unwrap();
+        let selection = design::Choosing {
+            inputs: &inputs,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget: &budget(),
+            watch: &unwatched,
+        }
+        .select(kind)
+        .unwrap();
         let sets = sets(&simulated, &feasibility.sites(), &selection, random);
         let sensing = (sets.iter())
             .map(|set| {

@@ -246,8 +246,15 @@ fn the_chosen_gauges_of_a_limb_carry_their_bound() {
     let feasibility = design::filter(&inputs, &simulated);
     let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget).unwrap();
     for kind in [SelectorKind::ExpectedError, SelectorKind::PcaQr] {
-        let selection =
-            design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();
+        let selection = design::Choosing {
+            inputs: &inputs,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget: &budget,
+            watch: &unwatched,
+        }
+        .select(kind)
+        .unwrap();
         let set = selection.sets.last().unwrap();
         println!("{kind:?}: {:?}, {:?}", set.certified(), set.criterion_mm);
         if kind == SelectorKind::ExpectedError {

@@ -51,8 +51,17 @@ fn selected(inputs: &Inputs) -> (Simulated, Vec<Selection>) {
     let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
     let feasibility = design::filter(inputs, &simulated);
     let reduced = design::reduce_sites(inputs, &simulated, &feasibility, &budget).unwrap();
-    let select =
-        |kind| design::select(inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();
+    let select = |kind| {
+        design::Choosing {
+            inputs,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget: &budget,
+            watch: &unwatched,
+        }
+        .select(kind)
+        .unwrap()
+    };
     // Expected error is judged on a sample of presses, whose own scatter is more than elements leave open.
     let selections = SelectorKind::PAPER.map(select).to_vec();
     (simulated, selections)

@@ -36,7 +36,15 @@ fn budget() -> Budget {
 }
 
 fn run(inputs: &Inputs) -> Result<Design, DesignError> {
-    design::run(inputs, &SelectorKind::ALL, &budget(), &|| 0.0, &unwatched)
+    design::run(
+        &design::DesignRequest {
+            inputs,
+            kinds: &SelectorKind::ALL,
+            budget: &budget(),
+        },
+        &|| 0.0,
+        &unwatched,
+    )
 }
 
 /// The design ends, and every figure in it is a number.
@@ -599,7 +607,17 @@ fn sites_are_reduced_only_where_somebody_asks_for_candidates() {
     let simulated = Arc::new(design::simulate(&inputs, &budget(), &unwatched).unwrap());
     let chosen = |inputs: &Inputs, kind: SelectorKind| {
         let simulated = Arc::clone(&simulated);
-        design::run_from(inputs, simulated, &[kind], &budget(), &|| 0.0, &unwatched).unwrap()
+        design::run_from(
+            &design::DesignRequest {
+                inputs,
+                kinds: &[kind],
+                budget: &budget(),
+            },
+            simulated,
+            &|| 0.0,
+            &unwatched,
+        )
+        .unwrap()
     };
     let reduces = |design: &Design| design.seconds.iter().any(|s| s.stage == "reduce");
     // Expected error chooses among all feasible sites, and matching compares with no others.
@@ -636,10 +654,12 @@ fn sites_are_reduced_only_where_somebody_asks_for_candidates() {
         assert!(page.contains("left unexplained") && !page.contains("The paper's comparison"));
     }
     let four = design::run_from(
-        &trained,
+        &design::DesignRequest {
+            inputs: &trained,
+            kinds: &SelectorKind::PAPER,
+            budget: &budget(),
+        },
         Arc::clone(&simulated),
-        &SelectorKind::PAPER,
-        &budget(),
         &|| 0.0,
         &unwatched,
     );

@@ -213,17 +213,14 @@ impl Bench {
         let gauges = lab.sensing.gauges.len();
         let mut options = board::options(&lab.inputs, gauges);
         options.drift = drift;
-        let workshop = Workshop::Exact;
-        let board = board::simulated(
-            &lab.inputs,
-            &lab.sensing,
-            workshop,
+        let asked = board::BoardRequest {
+            workshop: Workshop::Exact,
             script,
-            Some(10.0),
+            hardest: Some(10.0),
             options,
             faults,
-            &unwatched,
-        );
+        };
+        let board = board::simulated(&lab.inputs, &lab.sensing, asked, &unwatched);
         let mut settings = lab.inputs.project.live.settings(gauges);
         settings.relative = 0.05;
         let pipeline = Pipeline::new(Arc::clone(&lab.sensing.drawn.map), settings);

@@ -42,8 +42,18 @@ fn run(inputs: &Inputs, threads: usize) -> Design {
         .num_threads(threads)
         .build()
         .unwrap();
-    pool.install(|| design::run(inputs, &KINDS, &budget(), &|| 0.0, &unwatched))
-        .unwrap()
+    pool.install(|| {
+        design::run(
+            &design::DesignRequest {
+                inputs,
+                kinds: &KINDS,
+                budget: &budget(),
+            },
+            &|| 0.0,
+            &unwatched,
+        )
+    })
+    .unwrap()
 }
 
 /// By matching, on two threads.
@@ -200,7 +210,17 @@ fn another_region_is_quoted_from_what_was_found() {
             evaluation: Some(Arc::clone(&first.evaluation)),
         };
         let simulated = Arc::clone(&first.simulated);
-        design::run_step_by_step(asked, simulated, &KINDS, &budget(), known, &hooks).unwrap()
+        design::run_step_by_step(
+            &design::DesignRequest {
+                inputs: asked,
+                kinds: &KINDS,
+                budget: &budget(),
+            },
+            simulated,
+            known,
+            &hooks,
+        )
+        .unwrap()
     };
     let quoted = again(&asked);
     assert_eq!(
@@ -247,7 +267,16 @@ fn displacements_are_judged_by_regression_and_it_is_said() {
         failure_subsets: 0,
         ..Quality::Draft.budget()
     };
-    let design = design::run(&asked, &KINDS, &budget, &|| 0.0, &unwatched).unwrap();
+    let design = design::run(
+        &design::DesignRequest {
+            inputs: &asked,
+            kinds: &KINDS,
+            budget: &budget,
+        },
+        &|| 0.0,
+        &unwatched,
+    )
+    .unwrap();
     assert!(design.evaluation.matched.is_empty() && !design.evaluation.rows.is_empty());
     let notes = design.cautions().join("\n");
     assert!(notes.contains("evaluation.estimator"), "{notes}");

@@ -65,7 +65,14 @@ fn chosen(inputs: &Inputs) -> Vec<usize> {
     let feasibility = design::filter(inputs, simulated);
     let reduced = design::reduce_sites(inputs, simulated, &feasibility, &budget).unwrap();
     let kind = SelectorKind::ExpectedError;
-    let selection = design::select(inputs, simulated, &reduced, kind, &budget, &unwatched);
+    let selection = design::Choosing {
+        inputs,
+        simulated,
+        reduced: &reduced,
+        budget: &budget,
+        watch: &unwatched,
+    }
+    .select(kind);
     selection.unwrap().sets.pop().unwrap().sites
 }
 

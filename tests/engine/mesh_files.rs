@@ -584,8 +584,12 @@ fn a_gltf_takes_its_data_from_beside_it_and_below_only() {
     }
     let within = "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=";
     let (mut file, _) = gltf(&block()[..3], &indices, 4);
-    file["buffers"][0]["uri"] = json!(within);
-    assert!((read("gltf", file.to_string()).mesh.area() - 0.5).abs() < 1e-12);
+    // Some leave out what fills the last letters, and some the bytes that fill the last word but count them.
+    for left_out in [0, 1, 4] {
+        file["buffers"][0]["uri"] = json!(within[..within.len() - left_out]);
+        let area = read("gltf", file.to_string()).mesh.area();
+        assert!((area - 0.5).abs() < 1e-12, "{left_out}: {area}");
+    }
 }
 
 #[test]

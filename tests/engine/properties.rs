@@ -424,7 +424,17 @@ fn one_thread_or_many_give_the_same_bytes() {
             .build()
             .unwrap();
         let design = pool
-            .install(|| design::run(&inputs, &SelectorKind::ALL, &budget, &|| 0.0, &unwatched))
+            .install(|| {
+                design::run(
+                    &design::DesignRequest {
+                        inputs: &inputs,
+                        kinds: &SelectorKind::ALL,
+                        budget: &budget,
+                    },
+                    &|| 0.0,
+                    &unwatched,
+                )
+            })
             .unwrap();
         let bits: Vec<u64> = design
             .simulated
@@ -479,10 +489,12 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
         (3, 3, 3 * SAMPLE + 200)
     );
     let design = design::run_from(
-        &inputs,
+        &design::DesignRequest {
+            inputs: &inputs,
+            kinds: &SelectorKind::ALL,
+            budget: &budget,
+        },
         simulated,
-        &SelectorKind::ALL,
-        &budget,
         &|| 0.0,
         &unwatched,
     )
@@ -536,8 +548,15 @@ fn what_the_project_asks_of_a_choice_is_kept() {
     let feasibility = design::filter(&inputs, &simulated);
     let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget).unwrap();
     for kind in SelectorKind::ALL {
-        let chosen =
-            design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();
+        let chosen = design::Choosing {
+            inputs: &inputs,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget: &budget,
+            watch: &unwatched,
+        }
+        .select(kind)
+        .unwrap();
         let set = &chosen.sets.last().unwrap().sites;
         let cost = |s: &usize| {
             if sites[*s].gauge.position.z <= 0.06 {
@@ -558,12 +577,27 @@ fn what_the_project_asks_of_a_choice_is_kept() {
     let mut poor = inputs.clone();
     poor.project.selection.cost_budget = Some(0.1);
     for kind in SelectorKind::ALL {
-        let none = design::select(&poor, &simulated, &reduced, kind, &budget, &unwatched);
+        let none = design::Choosing {
+            inputs: &poor,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget: &budget,
+            watch: &unwatched,
+        }
+        .select(kind);
         let why = none.expect_err(kind.name()).to_string();
         assert!(why.contains("raise the budget"), "{kind:?}: {why}");
     }
     let choose = |inputs: &Inputs, kind| {
-        design::select(inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap()
+        design::Choosing {
+            inputs,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget: &budget,
+            watch: &unwatched,
+        }
+        .select(kind)
+        .unwrap()
     };
     let clean = choose(&inputs, SelectorKind::GreedySvr);
     inputs.project.gauge.noise_microstrain = 50.0;

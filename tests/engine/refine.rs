@@ -40,8 +40,18 @@ fn run(inputs: &Inputs, threads: usize) -> Design {
         .num_threads(threads)
         .build()
         .unwrap();
-    pool.install(|| design::run(inputs, &KINDS, &budget(), &|| 0.0, &unwatched))
-        .unwrap()
+    pool.install(|| {
+        design::run(
+            &design::DesignRequest {
+                inputs,
+                kinds: &KINDS,
+                budget: &budget(),
+            },
+            &|| 0.0,
+            &unwatched,
+        )
+    })
+    .unwrap()
 }
 
 /// As the lattice has them, and refined, a number of gauges each.
@@ -70,14 +80,24 @@ fn chosen(asked: &Inputs, threads: usize) -> (Arc<Simulated>, Selection) {
         let simulated = Arc::new(design::simulate(asked, &budget, &unwatched).unwrap());
         let feasibility = design::filter(asked, &simulated);
         let reduced = design::reduce_sites(asked, &simulated, &feasibility, &budget).unwrap();
-        let mut selection =
-            design::select(asked, &simulated, &reduced, KINDS[0], &budget, &unwatched).unwrap();
+        let mut selection = design::Choosing {
+            inputs: asked,
+            simulated: &simulated,
+            reduced: &reduced,
+            budget: &budget,
+            watch: &unwatched,
+        }
+        .select(KINDS[0])
+        .unwrap();
         let refined = design::refine(
-            asked,
+            &design::DesignRequest {
+                inputs: asked,
+                kinds: &[],
+                budget: &budget,
+            },
             simulated,
             &reduced,
             &mut selection,
-            &budget,
             &unwatched,
         );
         (refined.unwrap(), selection)
@@ -211,14 +231,14 @@ fn off_the_sites_are_those_of_the_choice() {
     let filtered = design::filter(&inputs(count, false), &refined.simulated);
     assert_eq!(filtered, *plain.feasibility);
     // From a simulation with gauges off its lattice on, the same is chosen.
-    let again = design::select(
-        &inputs(count, false),
-        &refined.simulated,
-        &refined.reduced,
-        KINDS[0],
-        &budget(),
-        &unwatched,
-    );
+    let again = design::Choosing {
+        inputs: &inputs(count, false),
+        simulated: &refined.simulated,
+        reduced: &refined.reduced,
+        budget: &budget(),
+        watch: &unwatched,
+    }
+    .select(KINDS[0]);
     assert_eq!(again.unwrap(), as_chosen(plain));
 }
 
@@ -257,8 +277,17 @@ fn what_is_known_of_a_refined_design_is_taken_over() {
         entered: &|_| (),
     };
     let (asked, simulated) = (inputs(count, true), Arc::clone(&design.simulated));
-    let again =
-        design::run_step_by_step(&asked, simulated, &KINDS, &budget(), known, &hooks).unwrap();
+    let again = design::run_step_by_step(
+        &design::DesignRequest {
+            inputs: &asked,
+            kinds: &KINDS,
+            budget: &budget(),
+        },
+        simulated,
+        known,
+        &hooks,
+    )
+    .unwrap();
     assert_eq!(again.chosen(), design.chosen());
     assert_eq!(again.chosen_row(), design.chosen_row());
     // What was measured there is of gauges there, and of no others that come to have their numbers.
@@ -281,11 +310,14 @@ fn it_can_be_stopped() {
         }
     };
     let stopped = design::refine(
-        &inputs(COUNTS[0], true),
+        &design::DesignRequest {
+            inputs: &inputs(COUNTS[0], true),
+            kinds: &[],
+            budget: &budget(),
+        },
         Arc::clone(&plain.simulated),
         &plain.reduced,
         &mut selection,
-        &budget(),
         &refining,
     );
     assert!(stopped.err().unwrap().is_cancelled());

@@ -223,7 +223,17 @@ fn other_regions_are_quoted_from_the_same_errors() {
     let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
     let run = |inputs: &Inputs, known: KnownStages| {
         let simulated = Arc::clone(&simulated);
-        design::run_step_by_step(inputs, simulated, &kinds, &budget, known, &hooks).unwrap()
+        design::run_step_by_step(
+            &design::DesignRequest {
+                inputs,
+                kinds: &kinds,
+                budget: &budget,
+            },
+            simulated,
+            known,
+            &hooks,
+        )
+        .unwrap()
     };
     let first = run(&inputs, KnownStages::default());
     inputs.project.evaluation.regions = vec![RegionKeys {
@@ -259,7 +269,16 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
     inputs.project.selection.selector = SelectorKind::PcaQr;
     let budget = Quality::Draft.budget();
     let kinds = [SelectorKind::PcaQr, SelectorKind::Entropy];
-    let design = design::run(&inputs, &kinds, &budget, &|| 0.0, &unwatched).unwrap();
+    let design = design::run(
+        &design::DesignRequest {
+            inputs: &inputs,
+            kinds: &kinds,
+            budget: &budget,
+        },
+        &|| 0.0,
+        &unwatched,
+    )
+    .unwrap();
     let row = |design: &design::Design, sensors: usize| {
         let set = Chooser::from(SelectorKind::PcaQr).set(sensors);
         design.evaluation.over_all(set).map(|r| r.error_mm)

@@ -14,7 +14,7 @@ use crate::source::{File, attributes, attributes_within, is_test};
 const EDGES: [&str; 4] = ["project", "given", "limb", "units"];
 
 /// Products and quotients with a power of a thousand in a file of the core. Left out are test code and
-/// tolerances: what stands beside a comparison, or is the least or most of something.
+/// tolerances: what stands beside a comparison, is the least or most of something, or has a name of its own.
 pub fn factors(file: &File) -> Vec<String> {
     let layer = file.name.split(['/', '.']).next().unwrap_or_default();
     if OUTER.iter().any(|o| o.0 == layer) || EDGES.contains(&layer) {

@@ -107,6 +107,42 @@ fn the_limb_is_shown_and_bends_under_a_click() {
 }
 
 #[test]
+fn what_moves_is_shaded_once_it_stands() {
+    let mut w = Window::open();
+    without_gauges(&mut w);
+    w.press("Front");
+    let mut turn = |by: f64, frames: Option<usize>| {
+        let camera = &mut w.harness.state_mut().view.camera;
+        camera.orbit(glam::DVec2::new(by, 0.0));
+        match frames {
+            Some(frames) => (0..frames).for_each(|_| w.harness.step()),
+            None => {
+                w.harness.run_ok();
+            }
+        }
+        w.picture()
+    };
+    let before = turn(0.0, None);
+    let moving = turn(40.0, Some(1));
+    let stands = turn(0.0, None);
+    let differing = |a: &RgbaImage, b: &RgbaImage| {
+        let pairs = a.pixels().zip(b.pixels());
+        pairs
+            .filter(|(a, b)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 3))
+            .count()
+    };
+    assert!(differing(&before, &moving) > 5000, "the limb turned");
+    assert_eq!(differing(&stands, &turn(0.0, Some(3))), 0);
+    if window::only_software() {
+        let shaded = differing(&moving, &stands);
+        assert!(
+            shaded > 5000,
+            "the frame after it is shaded: {shaded} pixels"
+        );
+    }
+}
+
+#[test]
 fn painting_erasing_undo_and_redo() {
     let mut w = Window::open();
     without_gauges(&mut w);

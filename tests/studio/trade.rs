@@ -102,7 +102,16 @@ fn a_sweep_goes_on_from_what_is_there_and_its_points_can_be_had_again() {
     record.points[0].setting.apply(&mut again.project);
     let budget = record.points[0].setting.budget(&again.project);
     let kinds = again.project.selectors();
-    let design = design::run(&again, &kinds, &budget, &|| 0.0, &unwatched).unwrap();
+    let design = design::run(
+        &design::DesignRequest {
+            inputs: &again,
+            kinds: &kinds,
+            budget: &budget,
+        },
+        &|| 0.0,
+        &unwatched,
+    )
+    .unwrap();
     assert!(record.judge.element_mm < 0.7 * design.simulated.element_mm);
     assert!(record.judge.element_mm < design.reference.element_mm);
     // The setting reproduces the point.

@@ -15,15 +15,24 @@ use hapdef::session::Session;
 use hapdef::studio::Studio;
 use image::RgbaImage;
 
-/// What is missing is said, with what to install: a test that passes without having looked is none.
-pub fn need_adapter() {
+fn adapters() -> Vec<wgpu::Adapter> {
     let instance =
         wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
+}
+
+/// What is missing is said, with what to install: a test that passes without having looked is none.
+pub fn need_adapter() {
     assert!(
-        !adapters.is_empty(),
+        !adapters().is_empty(),
         "no graphics adapter: tests/run.sh installs mesa-vulkan-drivers"
     );
+}
+
+/// Whether every adapter here is the processor itself.
+pub fn only_software() -> bool {
+    let is_software = |a: &wgpu::Adapter| a.get_info().device_type == wgpu::DeviceType::Cpu;
+    adapters().iter().all(is_software)
 }
 
 pub struct Window {

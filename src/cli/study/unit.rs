@@ -7,7 +7,7 @@ use serde_json::Map;
 
 use super::shared::{SharedSimulations, SimulationKey};
 use crate::budget::Watch;
-use crate::design::{self, DesignError};
+use crate::design::{self, DesignError, DesignRequest};
 use crate::io::cpu_seconds;
 use crate::io::project_file::LoadedProject;
 use crate::io::study_folder::{StudyFolder, UnitCost, UnitOutcome, plain};
@@ -101,10 +101,14 @@ impl Workbench {
         design::check_required(&inputs)?;
         let simulated = (self.shared).simulated(unit, made_from, watch)?;
         *shared = simulated.1;
-        let kinds = inputs.project.selectors();
         let begun = Instant::now();
         let clock = || begun.elapsed().as_secs_f64();
-        let design = design::run_from(&inputs, simulated.0, &kinds, &budget, &clock, watch)?;
+        let asked = DesignRequest {
+            inputs: &inputs,
+            kinds: &inputs.project.selectors(),
+            budget: &budget,
+        };
+        let design = design::run_from(&asked, simulated.0, &clock, watch)?;
         let found = figures(&inputs, &design, unit.0.study.base.density_g_cm3)?;
         Ok((found, design.cautions()))
     }

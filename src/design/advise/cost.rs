@@ -48,7 +48,6 @@ impl Cost {
     pub fn words(&self) -> String {
         /// Up to here numbers are read without words.
         const FEW: f64 = 1e4;
-        const THOUSAND: f64 = 1e3;
         let theory = if self.theory_percent > 0.0 {
             format!(" and {} % of theory", digits(self.theory_percent))
         } else {
@@ -67,7 +66,7 @@ impl Cost {
         let unknowns = if self.unknowns < FEW {
             digits(self.unknowns)
         } else {
-            format!("{} thousand", digits(self.unknowns / THOUSAND))
+            format!("{} thousand", digits(units::thousands(self.unknowns)))
         };
         format!(
             "{elements}, about {unknowns} unknowns, {} s of processor time, {} GB, {error}{theory} under a touch",

@@ -42,10 +42,25 @@ const RULE: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
 /// A line is held at the points of this rule (Gauss, two points) on each of its pieces, likewise.
 const LINE: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Of springs (Pa/m) that hold as if nothing gave way, beside elements of a size (m).
-#[must_use]
-pub fn firm(material: &Material, size: f64) -> f64 {
-    STIFF * material.youngs_modulus / size
+/// The surface of a part in the elements that it is held by.
+#[derive(Clone, Copy)]
+pub struct HeldSurface<'a> {
+    /// What springs stand on.
+    pub elements: &'a dyn Elements,
+    /// The surface itself.
+    pub mesh: &'a TriMesh,
+    /// Of the part: springs are as stiff as that asks for.
+    pub material: &'a Material,
+    /// Of an element (m).
+    pub size: f64,
+}
+
+impl HeldSurface<'_> {
+    /// Of springs (Pa/m) that hold as if nothing gave way.
+    #[must_use]
+    pub fn firm(&self) -> f64 {
+        STIFF * self.material.youngs_modulus / self.size
+    }
 }
 
 impl Grip {
@@ -87,18 +102,11 @@ impl Grip {
         any
     }
 
-    /// Holds a facet of a surface with springs of so much an area (Pa/m). `size` (m) is that of an element.
-    pub fn hold_facet(
-        &mut self,
-        elements: &dyn Elements,
-        mesh: &TriMesh,
-        facet: u32,
-        held: DofSet,
-        bedding: f64,
-        size: f64,
-    ) {
+    /// Holds a facet of a surface with springs of so much an area (Pa/m).
+    pub fn hold_facet(&mut self, on: &HeldSurface, facet: u32, held: DofSet, bedding: f64) {
+        let mesh = on.mesh;
         let longest = mesh.longest_side(facet);
-        let splits = (2.0 * longest / size).ceil().clamp(1.0, 64.0) as usize;
+        let splits = (2.0 * longest / on.size).ceil().clamp(1.0, 64.0) as usize;
         let pieces = crate::elasticity::load::pieces(splits);
         let area = mesh.facet_area(facet) / (splits * splits) as f64 / 3.0;
         let normal = mesh.facet_normal(facet);
@@ -111,61 +119,45 @@ impl Grip {
                     }),
                 };
                 let stiffness = bedding * area;
-                self.hold_point(elements, mesh.point(at), normal, held, stiffness);
+                self.hold_point(on.elements, mesh.point(at), normal, held, stiffness);
             }
         }
     }
 
-    /// Holds an edge of a surface with springs. `size` (m) is that of an element.
-    pub fn hold_edge(
-        &mut self,
-        elements: &dyn Elements,
-        mesh: &TriMesh,
-        edge: &Edge,
-        held: DofSet,
-        material: &Material,
-        size: f64,
-    ) {
+    /// Holds an edge of a surface with springs.
+    pub fn hold_edge(&mut self, on: &HeldSurface, edge: &Edge, held: DofSet) {
+        let mesh = on.mesh;
         let [a, b] = [edge.a, edge.b].map(|v| mesh.positions()[v as usize]);
         let length = a.distance(b);
-        let pieces = (2.0 * length / size).ceil().clamp(1.0, 64.0) as usize;
+        let pieces = (2.0 * length / on.size).ceil().clamp(1.0, 64.0) as usize;
         let normal = mesh.facet_normal(edge.triangles[0]);
-        let stiffness = STIFF * material.youngs_modulus * length / (pieces * LINE.len()) as f64;
+        let stiffness = STIFF * on.material.youngs_modulus * length / (pieces * LINE.len()) as f64;
         for piece in 0..pieces {
             for along in LINE {
                 let point = a.lerp(b, (piece as f64 + along) / pieces as f64);
-                self.hold_point(elements, point, normal, held, stiffness);
+                self.hold_point(on.elements, point, normal, held, stiffness);
             }
         }
     }
 
-    /// Holds a vertex of a surface with a spring. `size` (m) is that of an element.
-    pub fn hold_vertex(
-        &mut self,
-        elements: &dyn Elements,
-        mesh: &TriMesh,
-        vertex: u32,
-        held: DofSet,
-        material: &Material,
-        size: f64,
-    ) {
+    /// Holds a vertex of a surface with a spring.
+    pub fn hold_vertex(&mut self, on: &HeldSurface, vertex: u32, held: DofSet) {
+        let mesh = on.mesh;
         let normal = mesh.facet_normal(mesh.vertex_triangles()[vertex as usize][0]);
-        let stiffness = STIFF * material.youngs_modulus * size;
+        let stiffness = STIFF * on.material.youngs_modulus * on.size;
         let point = mesh.positions()[vertex as usize];
-        self.hold_point(elements, point, normal, held, stiffness);
+        self.hold_point(on.elements, point, normal, held, stiffness);
     }
 
-    /// Holds a piece of a face, so large (m²) that a point stands for it. `size` (m) is that of an element.
+    /// Holds a piece of a face in the part, so large (m²) that a point stands for it.
     pub fn hold_piece(
         &mut self,
-        elements: &dyn Elements,
+        on: &HeldSurface,
         (point, normal, area): (DVec3, DVec3, f64),
         held: DofSet,
-        material: &Material,
-        size: f64,
     ) {
-        let stiffness = firm(material, size) * area;
-        self.hold_point(elements, point, normal, held, stiffness);
+        let stiffness = on.firm() * area;
+        self.hold_point(on.elements, point, normal, held, stiffness);
     }
 
     /// `stiffness` in N/m; `normal` out of the surface there.

@@ -8,7 +8,7 @@ use super::cells::FiniteCells;
 use super::cut::Cutting;
 use super::dissection::Dissection;
 use super::grid::CellGrid;
-use super::grip::{self, Grip};
+use super::grip::{Grip, HeldSurface};
 use super::piece::TetrahedraPiece;
 use super::tetrahedra::OrderedTetrahedra;
 use super::{Elements, SolidModel};
@@ -230,7 +230,8 @@ impl Immersed {
         for (number, support) in self.supports.iter().enumerate() {
             if !hold_box(&mut grip, &elements, support, fineness) {
                 let held = displacements(support);
-                self.spring(&mut grip, &elements, number, held, fineness.size);
+                let on = self.held_surface(&elements, fineness.size);
+                self.spring(&mut grip, &on, number, held);
             }
         }
         SolidModel::new(surface, Box::new(elements), self.material, grip, watch)
@@ -258,15 +259,22 @@ impl Immersed {
         SolidModel::new(surface, Box::new(elements), self.material, grip, watch)
     }
 
+    fn held_surface<'a>(&'a self, elements: &'a dyn Elements, size: f64) -> HeldSurface<'a> {
+        HeldSurface {
+            elements,
+            mesh: &self.held.mesh,
+            material: &self.material,
+            size,
+        }
+    }
+
     /// Holds the facets of a support with springs, and its lines and single points where it has no facets: a deck may
     /// hold an edge, or three corners.
-    fn spring(&self, grip: &mut Grip, on: &dyn Elements, number: usize, held: DofSet, size: f64) {
-        let mesh = &self.held.mesh;
-        let firm = grip::firm(&self.material, size);
-        let bedding = self.supports[number].bedding.unwrap_or(firm);
-        for facet in 0..mesh.triangles().len() as u32 {
+    fn spring(&self, grip: &mut Grip, on: &HeldSurface, number: usize, held: DofSet) {
+        let bedding = self.supports[number].bedding.unwrap_or(on.firm());
+        for facet in 0..on.mesh.triangles().len() as u32 {
             if self.held.facet_belongs(facet, number) {
-                grip.hold_facet(on, mesh, facet, held, bedding, size);
+                grip.hold_facet(on, facet, held, bedding);
             }
         }
         // What gives way is not pinned by an edge or a corner that belongs to it beside its faces.
@@ -274,10 +282,10 @@ impl Immersed {
             return;
         }
         for edge in self.held.lines_of(number) {
-            grip.hold_edge(on, mesh, edge, held, &self.material, size);
+            grip.hold_edge(on, edge, held);
         }
         for vertex in self.held.spots_of(number) {
-            grip.hold_vertex(on, mesh, vertex, held, &self.material, size);
+            grip.hold_vertex(on, vertex, held);
         }
     }
 
@@ -306,14 +314,8 @@ impl Immersed {
             let in_border = || lies_in(facet, lower) || lies_in(facet, upper);
             if self.held.facet_belongs(facet, number) && in_border() {
                 let held = displacements(&self.supports[number]);
-                grip.hold_facet(
-                    on,
-                    mesh,
-                    facet,
-                    held,
-                    grip::firm(&self.material, size),
-                    size,
-                );
+                let on = self.held_surface(on, size);
+                grip.hold_facet(&on, facet, held, on.firm());
             }
         }
     }
@@ -360,7 +362,7 @@ impl Immersed {
             if is_volume {
                 continue;
             }
-            self.spring(&mut grip, cells, number, held, size);
+            self.spring(&mut grip, &self.held_surface(cells, size), number, held);
             if let (HeldRegion::Box(region), DofSet::DISPLACEMENTS, None) =
                 (&support.region, held, support.bedding)
             {
@@ -373,10 +375,10 @@ impl Immersed {
     /// Holds the part where the faces of a box go through it, however the cells stand: with the surface in the box they
     /// are the border of all that it holds.
     fn spring_across(&self, grip: &mut Grip, on: &FiniteCells, held: &OrientedBox, size: f64) {
-        let held_displacements = DofSet::DISPLACEMENTS;
-        let pieces = held.pieces_across(&self.held.mesh, size / PIECES_OF_CELL);
+        let on = self.held_surface(on, size);
+        let pieces = held.pieces_across(on.mesh, size / PIECES_OF_CELL);
         for piece in pieces.into_iter().filter(|p| self.surface.inside(p.0)) {
-            grip.hold_piece(on, piece, held_displacements, &self.material, size);
+            grip.hold_piece(&on, piece, DofSet::DISPLACEMENTS);
         }
     }
 }

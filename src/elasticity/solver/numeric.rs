@@ -4,6 +4,8 @@
 //! The library's own does the same in one call that nobody can stop. What runs side by side here is cut by the
 //! matrix, never by the number of threads, so that the factor is the same on any number of them.
 
+use std::ops::Range;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
     LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
@@ -101,7 +103,7 @@ impl Fronts<'_> {
             let first = begin + number * PANEL;
             let last = (first + PANEL).min(end);
             for &d in &self.waiting[s] {
-                self.tell(d as usize, first, last, done, panel, height, buffer);
+                self.update(d as usize, first..last, done, panel, height, buffer);
             }
         };
         let cost = |&d: &u32| {
@@ -122,13 +124,14 @@ impl Fronts<'_> {
         }
     }
 
-    /// What a factored supernode says of the columns `first..last`, taken away from their panel.
-    #[allow(clippy::too_many_arguments)]
-    fn tell(
+    /// What a factored supernode says of some columns, taken away from their panel.
+    fn update(
         &self,
         d: usize,
-        first: usize,
-        last: usize,
+        Range {
+            start: first,
+            end: last,
+        }: Range<usize>,
         done: &[f64],
         panel: &mut [f64],
         height: usize,

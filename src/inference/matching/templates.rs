@@ -8,6 +8,7 @@ use super::weighed::Observation;
 use super::{Contact, Load, Matching};
 use crate::inference::map::LANES;
 use crate::inference::region::CredibleRegion;
+use crate::units::{microstrain, microstrain2, per_microstrain, per_microstrain2};
 
 /// Log-likelihoods so far below the best count for nothing.
 const NOTHING: f64 = 14.0;
@@ -16,29 +17,25 @@ const NOTHING: f64 = 14.0;
 /// likely, their mean is known to a share of a template.
 const LOOKED_AT: usize = 4096;
 
-/// Single precision is in microstrain: a reading, a variance, a weight (one over a variance), and a weight times a reading.
-const READING: f64 = 1e6;
-const VARIANCE: f64 = 1e12;
-const WEIGHT: f64 = 1e-12;
-const WEIGHTED: f64 = 1e-6;
-
 impl Matching {
-    /// How much better than nothing a touch at each template explains the reading.
+    /// How much better than nothing a touch at each template explains the reading. Single precision is in microstrain.
     pub(in crate::inference) fn score(&mut self, observed: &Observation) {
-        let weights: Vec<f32> = observed.w.iter().map(|w| (w * WEIGHT) as f32).collect();
+        let weights: Vec<f32> = (observed.w.iter())
+            .map(|w| per_microstrain2(*w) as f32)
+            .collect();
         let most = self.most_force as f32;
         // To begin with, each channel may be off for itself by what all of them feel together.
         if let Some(deviations) = &self.errors.deviations {
             let reading: Vec<f32> = observed
                 .reading()
                 .iter()
-                .map(|x| (x * READING) as f32)
+                .map(|x| microstrain(*x) as f32)
                 .collect();
             score_with_gluing(
                 [&self.map.templates, &deviations.all.templates],
                 &reading,
                 &weights,
-                (observed.drift * VARIANCE) as f32,
+                microstrain2(observed.drift) as f32,
                 most,
                 &mut self.scores,
                 &mut self.highest,
@@ -46,14 +43,14 @@ impl Matching {
             return;
         }
         let scaled: Vec<f32> = (observed.reading().iter().zip(&observed.w))
-            .map(|(x, w)| (w * x * WEIGHTED) as f32)
+            .map(|(x, w)| per_microstrain(w * x) as f32)
             .collect();
         let [taken, sum] = observed.drifted();
         score_templates(
             &self.map.templates,
             &scaled,
             &weights,
-            [(taken * VARIANCE) as f32, (sum * WEIGHTED) as f32],
+            [microstrain2(taken) as f32, per_microstrain(sum) as f32],
             most,
             &mut self.scores,
             &mut self.highest,

@@ -1,5 +1,8 @@
 //! What the graphics adapter is given: vertices, what changes on them, and the uniforms of the shader.
 
+use std::borrow::Cow;
+
+use super::corners::LitCorners;
 use crate::mesh::TriMesh;
 
 /// A vertex of a [`Solid`].
@@ -16,6 +19,8 @@ pub struct GpuVertex {
 /// Triangles to be drawn.
 pub struct Solid {
     pub vertices: Vec<GpuVertex>,
+    /// Which of the vertices the last ones are once more, with the normal of another side of a sharp edge.
+    pub again: Vec<u32>,
     pub triangles: Vec<[u32; 3]>,
     /// Pairs of vertices between which a line is drawn: rims and sharp edges.
     pub edges: Vec<[u32; 2]>,
@@ -24,7 +29,10 @@ pub struct Solid {
 impl Solid {
     #[must_use]
     pub fn of(mesh: &TriMesh) -> Self {
-        let vertices = mesh.positions().iter().zip(mesh.vertex_normals());
+        let corners = LitCorners::of(mesh);
+        let positions = mesh.positions();
+        let again = corners.again.iter().map(|&v| &positions[v as usize]);
+        let vertices = positions.iter().chain(again).zip(&corners.normals);
         Self {
             vertices: vertices
                 .map(|(p, n)| GpuVertex {
@@ -33,21 +41,20 @@ impl Solid {
                     stretch: 0.0,
                 })
                 .collect(),
-            triangles: mesh.triangles().to_vec(),
-            edges: edges(mesh),
+            triangles: corners.triangles,
+            edges: corners.edges,
+            again: corners.again,
         }
     }
-}
 
-/// Where the surface ends, branches, or turns by so much that nobody takes it for round.
-fn edges(mesh: &TriMesh) -> Vec<[u32; 2]> {
-    /// 40°: a circle of ten sides is round.
-    const SHARP: f64 = 0.766;
-    let drawn = mesh.edges().iter().filter(|edge| match edge.triangles[..] {
-        [a, b] => mesh.facet_normal(a).dot(mesh.facet_normal(b)) < SHARP,
-        _ => true,
-    });
-    drawn.map(|edge| [edge.a, edge.b]).collect()
+    /// What changes, given a vertex of the mesh, for all vertices that are drawn.
+    pub(super) fn spread<'a>(&self, shown: &'a [Shown]) -> Cow<'a, [Shown]> {
+        if self.again.is_empty() {
+            return shown.into();
+        }
+        let again = self.again.iter().map(|&v| shown[v as usize]);
+        shown.iter().copied().chain(again).collect()
+    }
 }
 
 /// What changes with field and region, a vertex.

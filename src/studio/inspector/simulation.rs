@@ -64,8 +64,7 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         "Lightest touch",
         lightest,
         *forces.start()..=most,
-        0.1,
-        "N",
+        (0.1, "N"),
         "How hard touches come: from here to the hardest, evenly over the logarithm",
     );
     quantity(
@@ -73,8 +72,7 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         "Hardest touch",
         hardest,
         least..=*forces.end(),
-        0.1,
-        "N",
+        (0.1, "N"),
         "How hard touches come: from the lightest to here, evenly over the logarithm",
     );
     number(

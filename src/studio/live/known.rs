@@ -31,8 +31,7 @@ fn next_touch(ask: &mut Ask<'_>, ui: &mut Ui) {
                 "Force",
                 &mut desk.known_force_n,
                 0.1..=100.0,
-                0.1,
-                "N",
+                (0.1, "N"),
                 "That the next known touch is pressed with",
             );
         });
