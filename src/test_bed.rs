@@ -7,6 +7,8 @@
 mod asked;
 mod by_hand;
 mod dataset;
+mod hand_desk;
+mod hand_words;
 mod places;
 mod ready;
 mod reference;
@@ -15,8 +17,10 @@ mod run;
 mod simulated;
 
 pub use asked::{BenchRequest, Flaws};
-pub use by_hand::{HandOrder, HandRun, HandSays};
+pub use by_hand::HandRun;
 pub use dataset::{CollectedRun, Wanted};
+pub use hand_desk::HandPlan;
+pub use hand_words::{HARDEST_N, HandOrder, HandSays, PressOrder};
 pub use ready::{Ready, pressed};
 pub use rounds::{Met, PressErrors, Round, RunGoal};
 pub use run::PressingRun;

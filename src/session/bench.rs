@@ -16,7 +16,9 @@ use crate::design::{Inputs, Sensing};
 use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{Address, BY_HAND, BenchOrder, Pace};
-use crate::test_bed::{BenchRequest, HandOrder, HandRun, PressingRun, Ready, press_on_simulated};
+use crate::test_bed::{
+    BenchRequest, HandOrder, HandRun, PressOrder, PressingRun, Ready, press_on_simulated,
+};
 
 impl Session {
     /// Chooses where is pressed, and shows it. Nothing moves.
@@ -246,7 +248,7 @@ enum PressedBy {
 /// What whoever presses is told.
 struct OrderInbox {
     machine: Receiver<BenchOrder>,
-    hand: Receiver<HandOrder>,
+    hand: Receiver<PressOrder>,
 }
 
 impl Bench {
@@ -302,13 +304,13 @@ fn is_ended(pressing: &Mutex<Option<PressingPlan>>, r: &Reporter) -> bool {
 fn press_by_hand(
     run: &HandRun,
     board: &Address,
-    inbox: &Receiver<HandOrder>,
+    inbox: &Receiver<PressOrder>,
     pressing: &Mutex<Option<PressingPlan>>,
     r: &Reporter,
 ) -> anyhow::Result<RunEnd> {
     /// How often it is asked whether the job was ended.
     const EVERY: Duration = Duration::from_millis(50);
-    if run.left.is_empty() {
+    if run.plan.left.is_empty() {
         return Ok(RunEnd::Finished);
     }
     if let Some(plan) = locked(pressing).as_mut() {
@@ -322,16 +324,16 @@ fn press_by_hand(
             is_ended(pressing, r)
         };
         let order = if ended {
-            Some(HandOrder::Stop)
+            Some(HandOrder::Stop.into())
         } else {
             inbox.try_recv().ok()
         };
-        stopped |= order == Some(HandOrder::Stop);
+        stopped |= order.is_some_and(|said| said.order == HandOrder::Stop);
         order
     };
     run.press_at(board.clone(), (&mut orders, false), |says| {
         if let Some(plan) = locked(pressing).as_mut() {
-            plan.hear_hand(&says, run.meant_n);
+            plan.hear_hand(&says, run.plan.meant_n);
         }
     })?;
     Ok(if stopped {

@@ -2,6 +2,7 @@
 
 use std::io::{BufRead as _, IsTerminal as _};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
 use anyhow::{Context as _, ensure};
@@ -13,10 +14,7 @@ use crate::cli::out;
 use crate::design::{Inputs, Sensing};
 use crate::link::{Address, Pace};
 use crate::plain;
-use crate::test_bed::{HandOrder, HandRun, HandSays, PressingRun, pressed};
-
-/// Nobody presses harder (N).
-const HARDEST_N: f64 = 1e4;
+use crate::test_bed::{HARDEST_N, HandOrder, HandRun, HandSays, PressOrder, PressingRun, pressed};
 
 /// Presses what is left of a run.
 pub fn run(
@@ -27,13 +25,17 @@ pub fn run(
 ) -> anyhow::Result<()> {
     let board = board(args)?;
     let run = HandRun::new(run, inputs, sensing)?;
-    let all = run.places.len();
-    if !run.left.is_empty() {
-        let inbox = typed(&run);
-        out::say("hapdef: waiting for the board; leave the limb alone until its rest is taken");
+    let all = run.plan.places.len();
+    if !run.plan.left.is_empty() {
         // Somebody at a terminal says it of the press that was; a script says all of them beforehand.
         let ahead = !std::io::stdin().is_terminal();
+        let shown = Arc::new(AtomicUsize::new(NOTHING));
+        let inbox = typed(&run, (!ahead).then(|| Arc::clone(&shown)));
+        out::say("hapdef: waiting for the board; leave the limb alone until its rest is taken");
         run.press_at(board, (&mut || next(&inbox), ahead), |says| {
+            if let HandSays::Press { number, .. } = &says {
+                shown.store(*number, Ordering::Relaxed);
+            }
             say(&says, args.force_n());
         })?;
     }
@@ -68,9 +70,12 @@ fn say(says: &HandSays, meant_n: f64) {
     });
 }
 
-/// What is typed, a line each.
-fn typed(run: &HandRun) -> Receiver<HandOrder> {
-    out::say(if run.has_sensor {
+/// In place of a press's number, before there is one.
+const NOTHING: usize = usize::MAX;
+
+/// What is typed, a line each: of the press that is asked for as it is typed, where somebody sees that.
+fn typed(run: &HandRun, shown: Option<Arc<AtomicUsize>>) -> Receiver<PressOrder> {
+    out::say(if run.plan.has_sensor {
         "write skip, stop, or at X Y Z (mm) where you press elsewhere, and press Enter"
     } else {
         "write how hard each press was (N), skip, stop, or at X Y Z (mm) where you pressed elsewhere, and press Enter"
@@ -79,18 +84,20 @@ fn typed(run: &HandRun) -> Receiver<HandOrder> {
     // Without a thread there are no orders, and every press is as hard as is meant.
     let _ = std::thread::Builder::new()
         .name("orders".into())
-        .spawn(move || read_lines(&orders));
+        .spawn(move || read_lines(&orders, shown.as_deref()));
     inbox
 }
 
-fn read_lines(orders: &Sender<HandOrder>) {
+fn read_lines(orders: &Sender<PressOrder>, shown: Option<&AtomicUsize>) {
     for line in std::io::stdin().lock().lines().map_while(Result::ok) {
         let Some(order) = order_of(line.trim()) else {
             let line = plain::quote(line.trim());
             out::say(&format!("{line} is no force, no place and no order"));
             continue;
         };
-        if orders.send(order).is_err() {
+        let number = shown.map(|shown| shown.load(Ordering::Relaxed));
+        let number = number.filter(|&number| number != NOTHING);
+        if orders.send(PressOrder { number, order }).is_err() {
             return;
         }
     }
@@ -116,17 +123,45 @@ fn order_of(line: &str) -> Option<HandOrder> {
         "skip" => Some(HandOrder::Skip),
         "stop" => Some(HandOrder::Stop),
         force => {
-            let force: f64 = force.trim_end_matches(['N', ' ']).parse().ok()?;
+            let force = force.trim_end_matches(['N', ' ']).replace(',', ".");
+            let force: f64 = force.parse().ok()?;
             (force > 0.0 && force <= HARDEST_N).then_some(HandOrder::Force(force))
         }
     }
 }
 
 /// The next line. Where nobody can type, every press is as hard as is meant.
-fn next(inbox: &Receiver<HandOrder>) -> Option<HandOrder> {
+fn next(inbox: &Receiver<PressOrder>) -> Option<PressOrder> {
     match inbox.try_recv() {
         Ok(order) => Some(order),
         Err(TryRecvError::Empty) => None,
-        Err(TryRecvError::Disconnected) => Some(HandOrder::AsMeant),
+        Err(TryRecvError::Disconnected) => Some(HandOrder::AsMeant.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_read_as_people_write_them() {
+        for (line, order) in [
+            ("", HandOrder::AsMeant),
+            ("9.5", HandOrder::Force(9.5)),
+            ("9,5 N", HandOrder::Force(9.5)),
+            ("skip", HandOrder::Skip),
+            ("at", HandOrder::Elsewhere(None)),
+            (
+                "at 1, -2.5 3",
+                HandOrder::Elsewhere(Some(DVec3::new(1.0, -2.5, 3.0) * 1e-3)),
+            ),
+        ] {
+            assert_eq!(order_of(line), Some(order), "{line}");
+        }
+        for line in [
+            "0", "-3", "20000", "nan", "inf", "at 1 2", "at 1 2 x", "1.2.3", "go",
+        ] {
+            assert_eq!(order_of(line), None, "{line}");
+        }
     }
 }

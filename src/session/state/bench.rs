@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::pressing::{HandStep, PressingPlan};
 use crate::link::BenchOrder;
-use crate::test_bed::{BenchRequest, HandOrder};
+use crate::test_bed::{BenchRequest, HandOrder, PressOrder};
 
 /// What is typed at the bench, none of it a project's.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +48,7 @@ impl Default for BenchDesk {
 /// To whoever presses: a machine or somebody.
 pub(in crate::session) enum Orders {
     Machine(Sender<BenchOrder>),
-    Hand(Sender<HandOrder>),
+    Hand(Sender<PressOrder>),
 }
 
 /// The bench: its plan, shared with whoever goes through it, and who gives that orders.
@@ -132,16 +132,17 @@ impl Bench {
         let _ = match (&self.orders, order) {
             (Some(Orders::Machine(orders)), order) => orders.send(order).is_ok(),
             (Some(Orders::Hand(orders)), BenchOrder::Stop | BenchOrder::Kill) => {
-                orders.send(HandOrder::Stop).is_ok()
+                orders.send(HandOrder::Stop.into()).is_ok()
             }
             _ => false,
         };
     }
 
-    /// Tells whoever presses by hand.
+    /// Tells whoever presses by hand, of the press that is asked for.
     pub(in crate::session) fn order_hand(&self, order: HandOrder) {
         if let Some(Orders::Hand(orders)) = &self.orders {
-            let _ = orders.send(order);
+            let number = self.look(PressingPlan::asked_for).flatten();
+            let _ = orders.send(PressOrder { number, order });
         }
     }
 }

@@ -41,8 +41,8 @@ impl PlannedRun {
                 let numbers = ready.numbers.iter();
                 numbers.map(|n| (*n, ready.done.contains(n))).collect()
             }
-            Self::Hand(run) => (0..run.places.len())
-                .map(|number| (number, !run.left.contains(&number)))
+            Self::Hand(run) => (0..run.plan.places.len())
+                .map(|number| (number, !run.plan.left.contains(&number)))
                 .collect(),
         }
     }
@@ -55,7 +55,7 @@ impl PlannedRun {
                 let presses = ready.reach.presses.iter();
                 presses.map(|press| (press.at, press.normal)).collect()
             }
-            Self::Hand(run) => run.places.clone(),
+            Self::Hand(run) => run.plan.places.clone(),
         }
     }
 
@@ -98,6 +98,8 @@ pub struct PressingPlan {
     pub checking: bool,
     /// By hand, while it goes on: what is to be done, and where this press is (m) if not where it was asked for.
     pub hand: Option<(HandStep, Option<DVec3>)>,
+    /// By hand, the number of the press that was asked for last.
+    asked_for: Option<usize>,
     numbers: Vec<usize>,
     /// How many of them are made, and how many failed: asked at every look of whoever presses.
     counts: [usize; 2],
@@ -124,6 +126,7 @@ impl PressingPlan {
             said: Vec::new(),
             checking: false,
             hand: None,
+            asked_for: None,
             numbers: numbered.into_iter().map(|(number, _)| number).collect(),
             counts: [made, 0],
             run,
@@ -205,6 +208,7 @@ impl PressingPlan {
                 self.let_go();
                 self.set(*number, PressState::Now);
                 self.hand = Some((HandStep::Press, None));
+                self.asked_for = Some(*number);
             }
             HandSays::Moved(at) => {
                 let step = self.hand.map_or(HandStep::Press, |(step, _)| step);
@@ -222,6 +226,11 @@ impl PressingPlan {
                 self.say(says.in_words(meant_n));
             }
         }
+    }
+
+    /// The number in the plan of the press that was asked for last, by hand.
+    pub(in crate::session) fn asked_for(&self) -> Option<usize> {
+        self.asked_for
     }
 
     pub(in crate::session) fn end(&mut self, ended: &RunEnd) {

@@ -10,7 +10,7 @@ use super::super::theme;
 use super::hand::hand_form;
 use crate::plain;
 use crate::session::{BenchDesk, PressState, PressingPlan};
-use crate::test_bed::{BenchRequest, Flaws};
+use crate::test_bed::{BenchRequest, Flaws, HARDEST_N};
 
 /// Failed presses that are named.
 const NAMED: usize = 5;
@@ -191,12 +191,12 @@ fn press_rows(ui: &mut Ui, asked: &mut BenchRequest) {
 }
 
 fn force_row(ui: &mut Ui, label: &str, value: &mut f64, help: &str) {
-    quantity(ui, label, value, 0.1..=1e4, 0.5, "N", help);
+    quantity(ui, label, value, 0.1..=HARDEST_N, (0.5, "N"), help);
 }
 
 fn machine_press_rows(ui: &mut Ui, asked: &mut BenchRequest) {
     let mut length = |label, value: &mut f64, range, help| {
-        quantity(ui, label, value, range, 0.01, "mm", help);
+        quantity(ui, label, value, range, (0.01, "mm"), help);
     };
     length(
         "Step",

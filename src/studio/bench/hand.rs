@@ -8,6 +8,7 @@ use super::super::ask::Ask;
 use super::super::commands::UiCommand;
 use super::super::theme;
 use crate::session::HandStep;
+use crate::test_bed::HARDEST_N;
 
 /// What whoever presses is to do, as long as a run by hand goes on.
 pub fn hand_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -64,7 +65,7 @@ fn force_row(ask: &mut Ask<'_>, ui: &mut Ui) {
         ask.edit_desk(|desk| {
             let name = ui.label("Force");
             let force = DragValue::new(&mut desk.bench.typed_n)
-                .range(0.1..=1e4)
+                .range(0.1..=HARDEST_N)
                 .speed(0.1)
                 .max_decimals(3)
                 .custom_parser(parsed)
