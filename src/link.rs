@@ -2,6 +2,8 @@
 
 mod benching;
 mod counted_line;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 mod held;
 mod host;
 #[cfg(feature = "mcap")]
@@ -16,12 +18,16 @@ mod serial;
 mod session;
 mod socket;
 mod table;
+#[cfg(any(feature = "mcap", feature = "foxglove"))]
+mod touch_messages;
 mod truths;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 pub use benching::{BY_HAND, BenchOrder, press_at_ports, press_simulated};
+#[cfg(feature = "foxglove")]
+pub use foxglove::FoxgloveServer;
 pub use held::HeldConnection;
 pub use host::{Doorway, Entrance, Hosted, host};
 #[cfg(feature = "mcap")]

@@ -34,7 +34,7 @@ use crate::plain;
 use crate::session::{train, training_touches};
 use crate::wire::Hello;
 
-use log::Log;
+use log::{FoxgloveServer, Log};
 use orders::{Client, from_stdin, order};
 
 #[derive(Args, Debug, Clone)]
@@ -77,6 +77,9 @@ pub struct ListenArgs {
     /// the link, found by matching. Never over an older file.
     #[arg(long)]
     pub mcap: Option<PathBuf>,
+    /// Serve the messages of --mcap to Foxglove as they come, at HOST:PORT (its WebSocket connection).
+    #[arg(long)]
+    pub foxglove: Option<String>,
     /// Serve the same lines to whoever connects to HOST:PORT, and obey what they write: `tare`.
     #[arg(long)]
     pub serve: Option<String>,
@@ -122,7 +125,7 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let learned = learned(args, &loaded)?;
     let (commands, inbox) = channel();
     let mut output = Output::new(args, commands.clone(), learned)?;
-    output.log = mcap_log(args, &loaded)?;
+    output.stream_touches(args, &loaded)?;
     let recorder = args.record.as_deref().map(Recorder::create).transpose();
     let recorder = recorder.map_err(anyhow::Error::msg)?;
     let pipeline = pipeline(args, &loaded, output.learned.as_ref())?;
@@ -153,18 +156,6 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     shown?;
     ended.map_err(anyhow::Error::msg)?;
     output.flush()
-}
-
-/// Where touches go as messages.
-fn mcap_log(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Option<Log>> {
-    let provenance = Provenance {
-        mesh_path: &loaded.mesh_path,
-        version: env!("CARGO_PKG_VERSION"),
-        taken_in: None,
-    };
-    let link = handover::link(&provenance);
-    let log = args.mcap.as_deref().map(|path| Log::create(path, &link));
-    log.transpose().map_err(anyhow::Error::msg)
 }
 
 /// The project, whose gauges, channels and calibration fit each other.
@@ -271,6 +262,7 @@ struct Output {
     stdout: BufWriter<std::io::Stdout>,
     csv: Option<SampleTable>,
     log: Option<Log>,
+    foxglove: Option<FoxgloveServer>,
     served: Option<(TcpListener, Vec<Client>)>,
     /// For whoever is served.
     commands: Sender<ListenerCommand>,
@@ -292,6 +284,7 @@ impl Output {
             learned,
             commands,
             log: None,
+            foxglove: None,
             served: args.serve.as_deref().map(serve).transpose()?,
             csv: args.csv.as_deref().map(SampleTable::create).transpose()?,
             stdout: BufWriter::new(std::io::stdout()),
@@ -300,6 +293,26 @@ impl Output {
             last_us: None,
             board: None,
         })
+    }
+
+    /// Where touches go as messages.
+    fn stream_touches(&mut self, args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
+        let provenance = Provenance {
+            mesh_path: &loaded.mesh_path,
+            version: env!("CARGO_PKG_VERSION"),
+            taken_in: None,
+        };
+        let link = handover::link(&provenance);
+        let log = args.mcap.as_deref().map(|path| Log::create(path, &link));
+        self.log = log.transpose().map_err(anyhow::Error::msg)?;
+        let asked = args.foxglove.as_deref();
+        let server = asked.map(|address| FoxgloveServer::open(address, &link));
+        let refused = |why| anyhow::anyhow!("--foxglove {why}. Choose another address");
+        self.foxglove = server.transpose().map_err(refused)?;
+        if let Some(address) = self.foxglove.as_ref().and_then(FoxgloveServer::address) {
+            say(&format!("Foxglove finds touches at ws://{address}"));
+        }
+        Ok(())
     }
 
     fn on_event(&mut self, event: &SessionEvent) -> anyhow::Result<()> {
@@ -321,6 +334,9 @@ impl Output {
             // What waits is written as soon as nothing more is there.
             SessionEvent::Turn { .. } => {
                 self.obey();
+                if let Some(server) = &mut self.foxglove {
+                    server.turn();
+                }
                 self.flush()?;
             }
         }
@@ -388,6 +404,9 @@ impl Output {
         }
         self.last_us = Some(update.time_us);
         self.log(update)?;
+        if let Some(server) = &mut self.foxglove {
+            server.sample(update);
+        }
         let line = match &self.learned {
             Some(TouchFile {
                 estimator: Learned::Regression(regression),

@@ -1,28 +1,15 @@
-//! Touches as an MCAP file, for Foxglove and other readers of robots' recordings: messages are JSON, their fields those of
-//! ROS's `tactile_msgs` and `geometry_msgs`.
-//!
-//! | topic | schema | holds |
-//! |---|---|---|
-//! | `/touch/contacts` | `tactile_msgs/TactileContacts` | all touches: place, normal, wrench in the link's frame, covariances |
-//! | `/touch/wrench` | `geometry_msgs/WrenchStamped` | the hardest, in a frame at the contact whose z points outwards |
-//! | `/tf` | `foxglove.FrameTransform` | that frame on the link |
+//! Touches as an MCAP file, for Foxglove and other readers of robots' recordings: the messages of [`TouchMessages`].
 
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
 
-use glam::{DMat3, DQuat, DVec3};
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
-use serde_json::{Value, json};
 
-use crate::inference::Contact;
+use super::touch_messages::{MessagesAt, TouchMessages, topics};
 use crate::live::LiveUpdate;
-
-/// The frame at the hardest touch.
-const FRAME: &str = "contact";
 
 /// A file that is being written.
 pub struct McapLog {
@@ -30,10 +17,7 @@ pub struct McapLog {
     writer: Writer<BufWriter<File>>,
     channels: [u16; 3],
     sequence: u32,
-    link: String,
-    /// Nanoseconds since 1970 when it was begun, and the board's clock at the first sample (µs).
-    begun_ns: u64,
-    first_us: Option<u64>,
+    touches: TouchMessages,
 }
 
 impl McapLog {
@@ -61,15 +45,12 @@ impl McapLog {
             let added = writer.add_channel(id, topic, "json", &BTreeMap::new());
             *channel = added.map_err(|e| failed(&e))?;
         }
-        let now = SystemTime::now().duration_since(UNIX_EPOCH);
         Ok(Self {
             path: path.to_owned(),
             writer,
             channels,
             sequence: 0,
-            link: link.to_owned(),
-            begun_ns: now.map_or(0, |d| d.as_nanos() as u64),
-            first_us: None,
+            touches: TouchMessages::new(link),
         })
     }
 
@@ -78,27 +59,14 @@ impl McapLog {
     /// # Errors
     /// Why it can be written no more.
     pub fn sample(&mut self, update: &LiveUpdate) -> Result<(), String> {
-        let first = *self.first_us.get_or_insert(update.time_us);
-        let at = self.begun_ns + update.time_us.saturating_sub(first) * 1000;
-        let none = Vec::new();
-        let touches = update.touches.as_ref().map_or(&none, |t| &t.contacts);
-        let contacts: Vec<Value> = (1..)
-            .zip(touches)
-            .map(|(k, contact)| tactile(k, contact, &self.link, at))
-            .collect();
-        let mut messages = vec![(0, json!({ "contacts": contacts }))];
-        if let Some(contact) = touches.first().or(update.contact.as_ref()) {
-            let turn = frame(contact);
-            messages.push((1, wrench(contact, &turn, at)));
-            messages.push((2, transform(contact, &turn, &self.link, at)));
-        }
+        let MessagesAt { at_ns, messages } = self.touches.of(update);
         for (channel, message) in messages {
             self.sequence = self.sequence.wrapping_add(1);
             let header = MessageHeader {
                 channel_id: self.channels[channel],
                 sequence: self.sequence,
-                log_time: at,
-                publish_time: at,
+                log_time: at_ns,
+                publish_time: at_ns,
             };
             let bytes = message.to_string();
             let written = self
@@ -129,86 +97,4 @@ fn ended(path: &Path, error: McapError) -> String {
         "{}: it ends here, because it can be written no more: {why}",
         path.display()
     )
-}
-
-fn stamp(ns: u64, fraction: &str) -> Value {
-    json!({ "sec": ns / 1_000_000_000, fraction: ns % 1_000_000_000 })
-}
-
-fn three(v: DVec3) -> Value {
-    json!({ "x": v.x, "y": v.y, "z": v.z })
-}
-
-/// Axes of the frame at a contact: z outwards.
-fn frame(contact: &Contact) -> DMat3 {
-    let z = contact.normal;
-    let x = z.any_orthonormal_vector();
-    DMat3::from_cols(x, z.cross(x), z)
-}
-
-fn tactile(number: usize, contact: &Contact, link: &str, at: u64) -> Value {
-    /// Half-axes of a region are of nine in ten: these deviations of a normal distribution in the plane.
-    const DEVIATIONS: f64 = 2.145_966;
-    let outer = |v: DVec3| DMat3::from_cols(v * v.x, v * v.y, v * v.z);
-    let [a, b] = contact.region.axes.map(|axis| outer(axis / DEVIATIONS));
-    let n = outer(contact.normal);
-    let along = (DMat3::IDENTITY - n) * contact.drag_deviation.powi(2);
-    let force = along + n * contact.force_deviation.powi(2);
-    json!({
-        "name": format!("touch {number}"),
-        "header": { "stamp": stamp(at, "nanosec"), "frame_id": link },
-        "position": three(contact.position),
-        "normal": three(contact.normal),
-        "wrench": { "force": three(contact.on_part()), "torque": three(DVec3::ZERO) },
-        "position_covariance": (a + b).to_cols_array(),
-        "force_covariance": force.to_cols_array(),
-    })
-}
-
-fn wrench(contact: &Contact, turn: &DMat3, at: u64) -> Value {
-    json!({
-        "header": { "stamp": stamp(at, "nanosec"), "frame_id": FRAME },
-        "wrench": { "force": three(turn.transpose() * contact.on_part()), "torque": three(DVec3::ZERO) },
-    })
-}
-
-fn transform(contact: &Contact, turn: &DMat3, link: &str, at: u64) -> Value {
-    let q = DQuat::from_mat3(turn);
-    json!({
-        "timestamp": stamp(at, "nsec"),
-        "parent_frame_id": link,
-        "child_frame_id": FRAME,
-        "translation": three(contact.position),
-        "rotation": { "x": q.x, "y": q.y, "z": q.z, "w": q.w },
-    })
-}
-
-/// Topics with the names and fields of their messages.
-fn topics() -> [(&'static str, &'static str, Value); 3] {
-    let number = json!({ "type": "number" });
-    let text = json!({ "type": "string" });
-    let object = |fields: Value| json!({ "type": "object", "properties": fields });
-    let three = object(json!({ "x": number, "y": number, "z": number }));
-    let time = |fraction: &str| {
-        object(json!({ "sec": { "type": "integer" }, fraction: { "type": "integer" } }))
-    };
-    let header = object(json!({ "stamp": time("nanosec"), "frame_id": text }));
-    let wrench = object(json!({ "force": three, "torque": three }));
-    let nine = json!({ "type": "array", "items": number });
-    let contact = object(json!({
-        "name": text, "header": header, "position": three, "normal": three, "wrench": wrench,
-        "position_covariance": nine, "force_covariance": nine,
-    }));
-    let contacts = object(json!({ "contacts": { "type": "array", "items": contact } }));
-    let stamped = object(json!({ "header": header, "wrench": wrench }));
-    let turn = object(json!({ "x": number, "y": number, "z": number, "w": number }));
-    let transform = object(json!({
-        "timestamp": time("nsec"), "parent_frame_id": text, "child_frame_id": text,
-        "translation": three, "rotation": turn,
-    }));
-    [
-        ("/touch/contacts", "tactile_msgs/TactileContacts", contacts),
-        ("/touch/wrench", "geometry_msgs/WrenchStamped", stamped),
-        ("/tf", "foxglove.FrameTransform", transform),
-    ]
 }

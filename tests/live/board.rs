@@ -61,23 +61,19 @@ impl Running {
     }
 
     /// Waits until it says something on stderr.
-    fn says(&self, what: &str) {
+    pub fn says(&self, what: &str) -> String {
         let begun = Instant::now();
         while begun.elapsed() < Duration::from_mins(1) {
-            if self
-                .err
-                .recv_timeout(Duration::from_mins(1))
-                .expect(what)
-                .contains(what)
-            {
-                return;
+            let line = self.err.recv_timeout(Duration::from_mins(1)).expect(what);
+            if line.contains(what) {
+                return line;
             }
         }
         panic!("it never said “{what}”");
     }
 }
 
-fn board(more: &[&str]) -> (Running, String) {
+pub fn board(more: &[&str]) -> (Running, String) {
     let args = [&["board", "--simulate", "--quality", "draft"], more].concat();
     let running = start(&args);
     let first = running.json();
@@ -85,7 +81,7 @@ fn board(more: &[&str]) -> (Running, String) {
     (running, port)
 }
 
-fn listen(port: &str, more: &[&str]) -> Running {
+pub fn listen(port: &str, more: &[&str]) -> Running {
     start(&[&["listen", port, "--quality", "draft"], more].concat())
 }
 

@@ -13,6 +13,7 @@ mod calibrate;
 mod display;
 mod ends;
 mod firmware;
+mod foxglove;
 mod live;
 mod promise;
 mod rows;

@@ -1,4 +1,7 @@
-//! Touches as a file of messages, where this build can write one.
+//! Touches as messages: in a file and to whoever looks, where this build has that.
+
+#[cfg(feature = "foxglove")]
+pub(super) use crate::link::FoxgloveServer;
 
 #[cfg(feature = "mcap")]
 pub(super) use crate::link::McapLog as Log;
@@ -18,6 +21,29 @@ impl Log {
     }
 
     pub fn finish(&mut self) -> Result<(), String> {
+        match *self {}
+    }
+}
+
+/// There is none in this build.
+#[cfg(not(feature = "foxglove"))]
+pub(super) enum FoxgloveServer {}
+
+#[cfg(not(feature = "foxglove"))]
+impl FoxgloveServer {
+    pub fn open(_: &str, _: &str) -> Result<Self, String> {
+        Err("this build does not speak to Foxglove (feature \"foxglove\")".into())
+    }
+
+    pub fn address(&self) -> Option<std::net::SocketAddr> {
+        match *self {}
+    }
+
+    pub fn turn(&mut self) {
+        match *self {}
+    }
+
+    pub fn sample(&mut self, _: &crate::live::LiveUpdate) {
         match *self {}
     }
 }

@@ -1,0 +1,149 @@
+//! Touches as messages of a robot: JSON, with the fields of ROS's `tactile_msgs` and `geometry_msgs`.
+//!
+//! | topic | schema | holds |
+//! |---|---|---|
+//! | `/touch/contacts` | `tactile_msgs/TactileContacts` | all touches: place, normal, wrench in the link's frame, covariances |
+//! | `/touch/wrench` | `geometry_msgs/WrenchStamped` | the hardest, in a frame at the contact whose z points outwards |
+//! | `/tf` | `foxglove.FrameTransform` | that frame on the link |
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use glam::{DMat3, DQuat, DVec3};
+use serde_json::{Value, json};
+
+use crate::inference::Contact;
+use crate::live::LiveUpdate;
+
+/// The frame at the hardest touch.
+const FRAME: &str = "contact";
+
+/// What makes messages of touches.
+pub struct TouchMessages {
+    /// The frame that places are in.
+    link: String,
+    /// Nanoseconds since 1970 when it was begun, and the board's clock at the first sample (µs).
+    begun_ns: u64,
+    first_us: Option<u64>,
+}
+
+/// The messages of one sample.
+pub struct MessagesAt {
+    /// Nanoseconds since 1970.
+    pub at_ns: u64,
+    /// With the number of the topic that each is of.
+    pub messages: Vec<(usize, Value)>,
+}
+
+impl TouchMessages {
+    /// From now on; `link` is the frame that places are in.
+    #[must_use]
+    pub fn new(link: &str) -> Self {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        Self {
+            link: link.to_owned(),
+            begun_ns: now.map_or(0, |d| d.as_nanos() as u64),
+            first_us: None,
+        }
+    }
+
+    /// What touches at a sample.
+    pub fn of(&mut self, update: &LiveUpdate) -> MessagesAt {
+        let first = *self.first_us.get_or_insert(update.time_us);
+        let at_ns = self.begun_ns + update.time_us.saturating_sub(first) * 1000;
+        let none = Vec::new();
+        let touches = update.touches.as_ref().map_or(&none, |t| &t.contacts);
+        let contacts: Vec<Value> = (1..)
+            .zip(touches)
+            .map(|(k, contact)| tactile(k, contact, &self.link, at_ns))
+            .collect();
+        let mut messages = vec![(0, json!({ "contacts": contacts }))];
+        if let Some(contact) = touches.first().or(update.contact.as_ref()) {
+            let turn = frame(contact);
+            messages.push((1, wrench(contact, &turn, at_ns)));
+            messages.push((2, transform(contact, &turn, &self.link, at_ns)));
+        }
+        MessagesAt { at_ns, messages }
+    }
+}
+
+fn stamp(ns: u64, fraction: &str) -> Value {
+    json!({ "sec": ns / 1_000_000_000, fraction: ns % 1_000_000_000 })
+}
+
+fn three(v: DVec3) -> Value {
+    json!({ "x": v.x, "y": v.y, "z": v.z })
+}
+
+/// Axes of the frame at a contact: z outwards.
+fn frame(contact: &Contact) -> DMat3 {
+    let z = contact.normal;
+    let x = z.any_orthonormal_vector();
+    DMat3::from_cols(x, z.cross(x), z)
+}
+
+fn tactile(number: usize, contact: &Contact, link: &str, at: u64) -> Value {
+    /// Half-axes of a region are of nine in ten: these deviations of a normal distribution in the plane.
+    const DEVIATIONS: f64 = 2.145_966;
+    let outer = |v: DVec3| DMat3::from_cols(v * v.x, v * v.y, v * v.z);
+    let [a, b] = contact.region.axes.map(|axis| outer(axis / DEVIATIONS));
+    let n = outer(contact.normal);
+    let along = (DMat3::IDENTITY - n) * contact.drag_deviation.powi(2);
+    let force = along + n * contact.force_deviation.powi(2);
+    json!({
+        "name": format!("touch {number}"),
+        "header": { "stamp": stamp(at, "nanosec"), "frame_id": link },
+        "position": three(contact.position),
+        "normal": three(contact.normal),
+        "wrench": { "force": three(contact.on_part()), "torque": three(DVec3::ZERO) },
+        "position_covariance": (a + b).to_cols_array(),
+        "force_covariance": force.to_cols_array(),
+    })
+}
+
+fn wrench(contact: &Contact, turn: &DMat3, at: u64) -> Value {
+    json!({
+        "header": { "stamp": stamp(at, "nanosec"), "frame_id": FRAME },
+        "wrench": { "force": three(turn.transpose() * contact.on_part()), "torque": three(DVec3::ZERO) },
+    })
+}
+
+fn transform(contact: &Contact, turn: &DMat3, link: &str, at: u64) -> Value {
+    let q = DQuat::from_mat3(turn);
+    json!({
+        "timestamp": stamp(at, "nsec"),
+        "parent_frame_id": link,
+        "child_frame_id": FRAME,
+        "translation": three(contact.position),
+        "rotation": { "x": q.x, "y": q.y, "z": q.z, "w": q.w },
+    })
+}
+
+/// Topics with the names and fields of their messages.
+pub(super) fn topics() -> [(&'static str, &'static str, Value); 3] {
+    let number = json!({ "type": "number" });
+    let text = json!({ "type": "string" });
+    let object = |fields: Value| json!({ "type": "object", "properties": fields });
+    let three = object(json!({ "x": number, "y": number, "z": number }));
+    let time = |fraction: &str| {
+        object(json!({ "sec": { "type": "integer" }, fraction: { "type": "integer" } }))
+    };
+    let header = object(json!({ "stamp": time("nanosec"), "frame_id": text }));
+    let wrench = object(json!({ "force": three, "torque": three }));
+    let nine = json!({ "type": "array", "items": number });
+    let contact = object(json!({
+        "name": text, "header": header, "position": three, "normal": three, "wrench": wrench,
+        "position_covariance": nine, "force_covariance": nine,
+    }));
+    let contacts = object(json!({ "contacts": { "type": "array", "items": contact } }));
+    let stamped = object(json!({ "header": header, "wrench": wrench }));
+    let turn = object(json!({ "x": number, "y": number, "z": number, "w": number }));
+    let transform = object(json!({
+        "timestamp": time("nsec"), "parent_frame_id": text, "child_frame_id": text,
+        "translation": three, "rotation": turn,
+    }));
+    [
+        ("/touch/contacts", "tactile_msgs/TactileContacts", contacts),
+        ("/touch/wrench", "geometry_msgs/WrenchStamped", stamped),
+        ("/tf", "foxglove.FrameTransform", transform),
+    ]
+}

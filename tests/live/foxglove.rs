@@ -1,0 +1,194 @@
+//! Touches as they come, to viewers that speak Foxglove's WebSocket protocol.
+#![cfg(feature = "foxglove")]
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest as _;
+use tungstenite::http::HeaderValue;
+use tungstenite::{Message, WebSocket};
+
+use crate::board::{board, listen, start};
+
+/// How long anything may take (s).
+const SECONDS: u64 = 60;
+
+/// Where it is served.
+fn served(listener: &crate::board::Running) -> String {
+    let said = listener.says("Foxglove finds touches at ws://");
+    said.rsplit("ws://").next().unwrap().trim().to_owned()
+}
+
+fn viewer(address: &str, protocol: &str) -> Result<WebSocket<TcpStream>, String> {
+    let mut asked = format!("ws://{address}/").into_client_request().unwrap();
+    let protocol = HeaderValue::from_str(protocol).unwrap();
+    let headers = asked.headers_mut();
+    headers.insert("sec-websocket-protocol", protocol);
+    let stream = TcpStream::connect(address).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_secs(SECONDS)))
+        .unwrap();
+    let entered = tungstenite::client(asked, stream);
+    entered.map(|(socket, _)| socket).map_err(|e| e.to_string())
+}
+
+fn said(socket: &mut WebSocket<TcpStream>) -> Value {
+    loop {
+        if let Message::Text(text) = socket.read().unwrap() {
+            return serde_json::from_str(text.as_str()).unwrap();
+        }
+    }
+}
+
+/// A message: what it was asked for by, when it was (ns since 1970), and what it says.
+fn data(socket: &mut WebSocket<TcpStream>) -> (u32, u64, Value) {
+    loop {
+        if let Message::Binary(bytes) = socket.read().unwrap() {
+            assert_eq!(bytes[0], 1);
+            let id = u32::from_le_bytes(bytes[1..5].try_into().unwrap());
+            let at = u64::from_le_bytes(bytes[5..13].try_into().unwrap());
+            return (id, at, serde_json::from_slice(&bytes[13..]).unwrap());
+        }
+    }
+}
+
+#[test]
+fn a_viewer_sees_touches_as_they_come() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("s.csv");
+    let mut text = String::from("start_s,duration_s,x_mm,y_mm,z_mm,force_n\n");
+    for k in 0..40 {
+        let _ = writeln!(text, "{},2.0,22.5,22.5,60,15", 6 + 4 * k);
+    }
+    std::fs::write(&script, text).unwrap();
+    let (_board, port) = board(&["--rate", "200", "--script", script.to_str().unwrap()]);
+    let listener = listen(&port, &["--foxglove", "127.0.0.1:0"]);
+    let address = served(&listener);
+
+    // Nobody who speaks something else, or nothing, keeps others from it.
+    assert!(viewer(&address, "mqtt").is_err());
+    let mut mute = TcpStream::connect(&address).unwrap();
+    let mut noise = TcpStream::connect(&address).unwrap();
+    noise.write_all(&[0xff; 4096]).unwrap();
+
+    let mut socket = viewer(&address, "foxglove.websocket.v1, foxglove.sdk.v1").unwrap();
+    let info = said(&mut socket);
+    assert_eq!(
+        (&info["op"], &info["name"]),
+        (&json!("serverInfo"), &json!("HapDef Studio"))
+    );
+    let advertised = said(&mut socket);
+    let mut numbers = HashMap::new();
+    for channel in advertised["channels"].as_array().unwrap() {
+        assert_eq!(channel["encoding"], "json");
+        let schema: Value = serde_json::from_str(channel["schema"].as_str().unwrap()).unwrap();
+        assert_eq!(schema["type"], "object");
+        numbers.insert(
+            channel["topic"].as_str().unwrap().to_owned(),
+            channel["id"].clone(),
+        );
+    }
+    let say = |socket: &mut WebSocket<TcpStream>, what: Value| {
+        socket.send(Message::text(what.to_string())).unwrap();
+    };
+    say(
+        &mut socket,
+        json!({ "op": "getParameters", "parameterNames": [] }),
+    );
+    say(
+        &mut socket,
+        json!({ "op": "subscribe", "subscriptions": [{ "id": 9, "channelId": 77 }] }),
+    );
+    let refused = said(&mut socket);
+    assert_eq!(
+        (&refused["op"], &refused["level"]),
+        (&json!("status"), &json!(2))
+    );
+    say(
+        &mut socket,
+        json!({ "op": "subscribe", "subscriptions": [
+        { "id": 70, "channelId": numbers["/touch/contacts"] },
+        { "id": 71, "channelId": numbers["/tf"] },
+    ] }),
+    );
+
+    let begun = Instant::now();
+    let (mut last, mut placed) = (0, 0);
+    while placed < 50 {
+        assert!(
+            begun.elapsed() < Duration::from_secs(SECONDS),
+            "no touch was seen"
+        );
+        let (id, at, value) = data(&mut socket);
+        assert!(at >= last, "{at} after {last}");
+        last = at;
+        match id {
+            70 => assert!(value["contacts"].is_array()),
+            71 => {
+                assert_eq!(value["parent_frame_id"], "limb");
+                let at = ["x", "y", "z"].map(|k| value["translation"][k].as_f64().unwrap());
+                let off = DVec3::from_array(at).distance(DVec3::new(0.0225, 0.0225, 0.06));
+                placed += u32::from(off < 5e-3);
+            }
+            other => panic!("{other} was never asked for"),
+        }
+    }
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let off_s = now.unwrap().as_secs_f64() - last as f64 * 1e-9;
+    assert!(off_s.abs() < 600.0, "{off_s} s");
+
+    // What is not asked for any more does not come.
+    say(
+        &mut socket,
+        json!({ "op": "unsubscribe", "subscriptionIds": [70] }),
+    );
+    let mut after = 0;
+    while after < 20 {
+        after = if data(&mut socket).0 == 70 {
+            0
+        } else {
+            after + 1
+        };
+        assert!(begun.elapsed() < Duration::from_secs(2 * SECONDS));
+    }
+    // One who never said what it wanted is let go.
+    mute.set_read_timeout(Some(Duration::from_secs(SECONDS)))
+        .unwrap();
+    assert_eq!(mute.read(&mut [0; 16]).unwrap(), 0);
+}
+
+#[test]
+fn one_who_never_reads_holds_nobody_up() {
+    let (_board, port) = board(&["--rate", "1000"]);
+    let listener = listen(&port, &["--foxglove", "127.0.0.1:0"]);
+    let address = served(&listener);
+    let subscribe = json!({ "op": "subscribe", "subscriptions": [{ "id": 1, "channelId": 0 }] });
+    let enter = || {
+        let mut socket = viewer(&address, "foxglove.sdk.v1").unwrap();
+        socket.send(Message::text(subscribe.to_string())).unwrap();
+        socket
+    };
+    let _idle: Vec<WebSocket<TcpStream>> = (0..4).map(|_| enter()).collect();
+    let mut reads = enter();
+    // Its reads would time out.
+    for _ in 0..4000 {
+        assert_eq!(data(&mut reads).0, 1);
+    }
+}
+
+#[test]
+fn where_nothing_can_be_served_is_said_before_the_model_is_computed() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let (_board, port) = board(&[]);
+    for address in [address.as_str(), "nowhere"] {
+        let listener = start(&["listen", &port, "--quality", "draft", "--foxglove", address]);
+        let said = listener.says("nothing can be served there");
+        assert!(said.contains(&format!("--foxglove {address}: ")), "{said}");
+    }
+}
