@@ -8,12 +8,15 @@ mod held;
 mod host;
 #[cfg(feature = "mcap")]
 mod mcap_log;
+#[cfg(not(all(feature = "mcap", feature = "foxglove")))]
+mod not_built;
 mod port;
 mod ports;
 mod pressed;
 mod recorded;
 mod recording;
 mod replay;
+mod rewritten;
 mod serial;
 mod session;
 mod socket;
@@ -32,13 +35,18 @@ pub use held::HeldConnection;
 pub use host::{Doorway, Entrance, Hosted, host};
 #[cfg(feature = "mcap")]
 pub use mcap_log::McapLog;
+#[cfg(not(feature = "foxglove"))]
+pub use not_built::FoxgloveServer;
+#[cfg(not(feature = "mcap"))]
+pub use not_built::McapLog;
 pub use port::{Got, Pace, Port};
 pub use ports::{PortInfo, ports};
 pub use pressed::{BenchPress, bench_presses};
 pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
+pub use rewritten::{write_messages, write_table};
 pub use session::{Connection, ConnectionState, Listener, ListenerCommand, SessionEvent, Timing};
-pub use table::{SampleTable, write_table};
+pub use table::SampleTable;
 pub use truths::Truths;
 
 /// Where a board is found.

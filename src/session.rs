@@ -49,7 +49,8 @@ pub use kept::chooser_title;
 pub use latest::{Latest, LatestDesk};
 pub use live::training::{train, training_touches};
 pub use live::{
-    Awaited, Feed, Gathered, LEAST_KNOWN, Mishap, Recording, STRIPS_S, Strip, WANTED_KNOWN,
+    Awaited, Feed, Gathered, LEAST_KNOWN, Mishap, Recording, STRIPS_S, Strip, USUAL_ADDRESS,
+    WANTED_KNOWN,
 };
 pub use news::{Happening, SessionNews, UserMessage};
 pub use opening::Opened;

@@ -1,7 +1,6 @@
 //! `hapdef listen`: live touch without a window.
 
 mod line;
-mod log;
 mod orders;
 
 use std::io::{BufWriter, Write};
@@ -26,15 +25,14 @@ use crate::io::run::Provenance;
 use crate::io::touch_file::{self, TouchFile};
 use crate::io::{handover, kept_model};
 use crate::link::{
-    Address, BAUD, ConnectionState, Listener, ListenerCommand, Pace, Recorder, SampleTable,
-    SessionEvent,
+    Address, BAUD, ConnectionState, FoxgloveServer, Listener, ListenerCommand, McapLog, Pace,
+    Recorder, SampleTable, SessionEvent,
 };
 use crate::live::{LiveUpdate, Pipeline, Sample, ShownEstimator};
 use crate::plain;
 use crate::session::{train, training_touches};
 use crate::wire::Hello;
 
-use log::{FoxgloveServer, Log};
 use orders::{Client, from_stdin, order};
 
 #[derive(Args, Debug, Clone)]
@@ -261,7 +259,7 @@ fn say(text: &str) {
 struct Output {
     stdout: BufWriter<std::io::Stdout>,
     csv: Option<SampleTable>,
-    log: Option<Log>,
+    log: Option<McapLog>,
     foxglove: Option<FoxgloveServer>,
     served: Option<(TcpListener, Vec<Client>)>,
     /// For whoever is served.
@@ -303,7 +301,10 @@ impl Output {
             taken_in: None,
         };
         let link = handover::link(&provenance);
-        let log = args.mcap.as_deref().map(|path| Log::create(path, &link));
+        let log = args
+            .mcap
+            .as_deref()
+            .map(|path| McapLog::create(path, &link));
         self.log = log.transpose().map_err(anyhow::Error::msg)?;
         let asked = args.foxglove.as_deref();
         let server = asked.map(|address| FoxgloveServer::open(address, &link));
@@ -429,7 +430,7 @@ impl Output {
     }
 
     fn end_log(&mut self) -> anyhow::Result<()> {
-        let ended = self.log.as_mut().map(Log::finish);
+        let ended = self.log.as_mut().map(McapLog::finish);
         ended.transpose().map(drop).map_err(anyhow::Error::msg)
     }
 

@@ -21,19 +21,33 @@ pub struct McapLog {
 }
 
 impl McapLog {
-    /// Begins a file; `link` is the frame that places are in.
+    /// Begins a file, never over an older one; `link` is the frame that places are in.
     ///
     /// # Errors
     /// A message naming the file.
     pub fn create(path: &Path, link: &str) -> Result<Self, String> {
-        let failed = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
         let file = File::create_new(path).map_err(|e| {
             if e.kind() == std::io::ErrorKind::AlreadyExists {
-                failed(&"it exists, and is not written over. Choose another name")
+                let why = "it exists, and is not written over. Choose another name";
+                format!("{}: {why}", path.display())
             } else {
-                failed(&e)
+                format!("{}: {e}", path.display())
             }
         })?;
+        Self::begin(path, file, link)
+    }
+
+    /// Begins a file in place of an older one.
+    ///
+    /// # Errors
+    /// A message naming the file.
+    pub fn replace(path: &Path, link: &str) -> Result<Self, String> {
+        let file = File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Self::begin(path, file, link)
+    }
+
+    fn begin(path: &Path, file: File, link: &str) -> Result<Self, String> {
+        let failed = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
         let options = WriteOptions::new().compression(None).library("hapdef");
         let writer = options.create(BufWriter::new(file));
         let mut writer = writer.map_err(|e| failed(&e))?;

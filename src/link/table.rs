@@ -3,20 +3,17 @@
 use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::channel;
 
 use anyhow::Context as _;
 
-use super::{Address, Listener, Pace, SessionEvent};
 use crate::inference::SeveralTouches;
-use crate::live::{LiveUpdate, Pipeline, Sample};
+use crate::live::{LiveUpdate, Sample};
 
 /// A table of samples, with the truth where a simulated board has told it. Each file has as many columns in every
 /// row: one for each number of channels.
 pub struct SampleTable {
     /// The last one is being written.
-    paths: Vec<PathBuf>,
+    pub(super) paths: Vec<PathBuf>,
     file: BufWriter<File>,
     /// Where the board is really touched (m, N), where it tells.
     pub truth: Option<(glam::DVec3, f64)>,
@@ -40,7 +37,7 @@ impl SampleTable {
     }
 
     /// Begins a table in place of what may stand there.
-    fn replace(path: &Path) -> anyhow::Result<Self> {
+    pub(super) fn replace(path: &Path) -> anyhow::Result<Self> {
         let file = File::create(path)
             .with_context(|| format!("{}: the table cannot be written there", path.display()))?;
         Ok(Self {
@@ -188,38 +185,6 @@ fn numbered(first: &Path, number: usize) -> PathBuf {
         name.push(ending);
     }
     first.with_file_name(name)
-}
-
-/// Replays a recording into a table, in place of an older one; the files that it takes, more than one where the number of channels changes.
-///
-/// # Errors
-/// When the one cannot be read or the other not written.
-pub fn write_table(
-    recording: &Path,
-    table: &Path,
-    pipeline: Pipeline,
-) -> anyhow::Result<Vec<PathBuf>> {
-    let address = Address::Recording {
-        path: recording.to_owned(),
-        pace: Pace::Fast,
-    };
-    let mut rows = SampleTable::replace(table)?;
-    let (_commands, inbox) = channel();
-    let stop = AtomicBool::new(false);
-    let mut written: anyhow::Result<Option<PathBuf>> = Ok(None);
-    Listener::new(address, pipeline)
-        .run(&stop, &inbox, |event| match event {
-            SessionEvent::Truth(touch) => rows.truth = touch,
-            SessionEvent::Sample { sample, update, .. } if written.is_ok() => {
-                written = rows.take(sample, update);
-                stop.store(written.is_err(), Ordering::Relaxed);
-            }
-            _ => {}
-        })
-        .map_err(anyhow::Error::msg)?;
-    written?;
-    rows.flush()?;
-    Ok(rows.paths)
 }
 
 #[cfg(test)]

@@ -3,12 +3,14 @@
 pub(super) mod feed;
 pub(super) mod gathering;
 mod known;
+pub(super) mod streaming;
 pub(super) mod training;
 mod upkeep;
 
 pub use feed::{Feed, Recording, STRIPS_S, Strip};
 pub use gathering::{Awaited, Gathered};
 pub use known::{LEAST as LEAST_KNOWN, WANTED as WANTED_KNOWN};
+pub use streaming::USUAL_ADDRESS;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -214,11 +216,15 @@ impl Session {
             pipeline.set_trained(trained.clone(), used.clone());
         }
         let feed = Arc::clone(&self.live.feed);
+        let server = Arc::clone(&self.live.server);
         let (shared, over) = (Arc::clone(&feed), feed);
         let (wake, last) = (self.wake.clone(), self.wake.clone());
         let started = Connection::start(
             Listener::new(address, pipeline).knowing(truths),
-            move |event| feed::hear(&shared, &event, &|| wake.now()),
+            move |event| {
+                streaming::hear(&server, &event);
+                feed::hear(&shared, &event, &|| wake.now());
+            },
             move |ended| {
                 if let Ok(mut feed) = over.lock() {
                     feed.ended = Some(ended);

@@ -120,6 +120,8 @@ pub enum FileAction {
     Export(PathBuf),
     /// A recording as a table.
     WriteTable(PathBuf),
+    /// A recording as messages.
+    WriteMessages(PathBuf),
     /// The results in a study's folder.
     OpenStudy(PathBuf),
     /// A unit of the study that is open, as a project.
@@ -136,6 +138,9 @@ pub enum BoardAction {
     Mishap(Mishap),
     Tare,
     ToggleRecording(String),
+    /// Serves touches at this address.
+    Serve(String),
+    StopServing,
     Disconnect,
     /// Goes by the project's model again.
     CloseEstimator,
@@ -311,6 +316,7 @@ impl FileAction {
             Self::SaveTo(path) => session.save_to(&path),
             Self::Export(folder) => session.export(folder),
             Self::WriteTable(recording) => session.write_table(&recording),
+            Self::WriteMessages(recording) => session.write_messages(&recording),
             Self::OpenStudy(folder) => session.open_study(&folder),
             Self::OpenUnit(unit) => session.open_unit(unit),
             Self::OpenEstimator(path) => session.open_estimator(&path),
@@ -326,6 +332,8 @@ impl BoardAction {
             Self::Mishap(mishap) => session.let_happen(mishap),
             Self::Tare => session.tare(),
             Self::ToggleRecording(name) => session.toggle_recording(&name),
+            Self::Serve(address) => session.serve_touches(&address),
+            Self::StopServing => session.stop_serving(),
             Self::Disconnect => session.disconnect(),
             Self::CloseEstimator => session.close_estimator(),
             Self::TakeKnown => session.take_known(),

@@ -192,3 +192,48 @@ fn where_nothing_can_be_served_is_said_before_the_model_is_computed() {
         assert!(said.contains(&format!("--foxglove {address}: ")), "{said}");
     }
 }
+
+#[cfg(all(feature = "studio", feature = "mcap"))]
+#[test]
+fn the_window_serves_touches_and_writes_a_recording_as_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut w = crate::window::Window::open();
+    w.stage("Live");
+    w.press("Start a simulated board");
+    w.wait("the board", 120, |s| {
+        s.session.live.look(|feed| feed.tared) == Some(true)
+    });
+    w.session_mut().serve_touches("127.0.0.1:0");
+    let address = w.session().live.served_at.unwrap().to_string();
+    let mut socket = viewer(&address, "foxglove.sdk.v1").unwrap();
+    assert_eq!(said(&mut socket)["op"], "serverInfo");
+    let subscribe = json!({ "op": "subscribe", "subscriptions": [{ "id": 3, "channelId": 0 }] });
+    socket.send(Message::text(subscribe.to_string())).unwrap();
+    assert_eq!(data(&mut socket).0, 3);
+    w.harness.run_ok();
+    w.assert_named("touches that are served");
+    w.show("live-served");
+    w.press("Stop serving");
+    assert_eq!(w.session().live.served_at, None);
+    assert!(
+        (0..100_000).any(|_| socket.read().is_err()),
+        "the connection ends"
+    );
+
+    let recording = folder.path().join("r.hapdrec");
+    w.session_mut().record(&recording);
+    w.wait("samples", 60, |s| {
+        let samples = s
+            .session
+            .live
+            .look(|f| f.recording.as_ref().map(|r| r.samples));
+        samples.flatten().is_some_and(|samples| samples > 500)
+    });
+    w.press("Stop recording");
+    w.press("Write messages");
+    let path = recording.with_extension("mcap");
+    w.wait("the messages", 60, |s| !s.session.busy() && path.is_file());
+    let bytes = std::fs::read(&path).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap();
+    assert!(messages.map(Result::unwrap).count() > 500);
+}

@@ -13,6 +13,7 @@ use crate::live::LiveUpdate;
 use crate::project::LiveKeys;
 use crate::session::live::feed::{Feed, FeedShared};
 use crate::session::live::gathering::{Awaited, Gathered};
+use crate::session::live::streaming::ServerShared;
 use crate::session::live::training::TrainedPair;
 use crate::session::slot::Slot;
 use crate::session::state::learned::Learnt;
@@ -68,6 +69,9 @@ pub struct Live {
     pub(in crate::session) training_for: Option<Vec<bool>>,
     /// What was learned from presses, and is gone by.
     pub(in crate::session) learnt: Option<Learnt>,
+    /// Who serves touches to others, and where.
+    pub(in crate::session) server: ServerShared,
+    pub served_at: Option<std::net::SocketAddr>,
     /// The last recording that was begun.
     pub recorded: Option<PathBuf>,
     /// The settings that the pipeline has.

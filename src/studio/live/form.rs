@@ -14,7 +14,7 @@ use crate::board::Illness;
 use crate::link::{PortInfo, ports};
 use crate::live::ShownEstimator;
 use crate::project::LiveKeys;
-use crate::session::{Desk, Mishap};
+use crate::session::{Desk, Mishap, USUAL_ADDRESS};
 
 /// What is typed at the live stage.
 #[derive(Default)]
@@ -23,6 +23,7 @@ pub struct LiveForm {
     ports: Vec<PortInfo>,
     estimator: String,
     pub record_to: String,
+    serve_at: String,
 }
 
 /// The settings.
@@ -240,6 +241,7 @@ fn recording_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
             ask.act(FileAction::WriteTable(path));
         }
     });
+    messages_form(ask, form, ui);
     if let Some(recording) = recording {
         let text = format!(
             "{}: {} samples, {:.0} kB",
@@ -249,6 +251,44 @@ fn recording_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
         );
         ui.add(egui::Label::new(RichText::new(text).small()).wrap());
     }
+}
+
+/// Touches for robots and their tools.
+fn messages_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
+    rows(ui, "Messages", |ui| {
+        let name = ui.label("Foxglove");
+        let served = ask.session.live.served_at;
+        ui.horizontal(|ui| {
+            let field = TextEdit::singleline(&mut form.serve_at)
+                .desired_width(105.0)
+                .hint_text(USUAL_ADDRESS);
+            ui.add_enabled(served.is_none(), field).labelled_by(name.id);
+            let (label, action) = match served {
+                None => ("Serve", BoardAction::Serve(form.serve_at.clone())),
+                Some(_) => ("Stop serving", BoardAction::StopServing),
+            };
+            let help =
+                "Touches as they come, to Foxglove and others that speak its WebSocket protocol";
+            if ui.button(label).on_hover_text(help).clicked() {
+                ask.act(action);
+            }
+        });
+        ui.end_row();
+        let recording = ask.session.live.look(|f| f.recording.is_some()) == Some(true);
+        let last = ask.session.live.recorded.clone().filter(|_| !recording);
+        ui.label("");
+        let help = "The touches of the last recording as messages of ROS (.mcap) beside it, for Foxglove and other readers";
+        let button = egui::Button::new("Write messages");
+        if ui
+            .add_enabled(last.is_some(), button)
+            .on_hover_text(help)
+            .clicked()
+            && let Some(path) = last
+        {
+            ask.act(FileAction::WriteMessages(path));
+        }
+        ui.end_row();
+    });
 }
 
 fn measurement(ui: &mut Ui, live: &mut LiveKeys) {

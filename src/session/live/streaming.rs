@@ -1,0 +1,95 @@
+//! Touches for others: as they come, and a recording's as messages.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::io::handover;
+use crate::io::run::Provenance;
+use crate::job::Stop;
+use crate::link::{FoxgloveServer, McapLog, SessionEvent, write_messages};
+use crate::session::Session;
+use crate::session::jobs::Task;
+
+/// Who serves touches, shared with the listening thread.
+pub type ServerShared = Arc<Mutex<Option<FoxgloveServer>>>;
+
+/// Where touches are served where nobody says otherwise: what Foxglove proposes, on this machine alone.
+pub const USUAL_ADDRESS: &str = "127.0.0.1:8765";
+
+/// Serves what happened on the line.
+pub(super) fn hear(server: &ServerShared, event: &SessionEvent) {
+    let mut server = server.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(server) = server.as_mut() {
+        match event {
+            SessionEvent::Sample { update, .. } => server.sample(update),
+            SessionEvent::Turn { .. } => server.turn(),
+            _ => {}
+        }
+    }
+}
+
+impl Session {
+    /// Serves touches at `HOST:PORT` to Foxglove from now on.
+    pub fn serve_touches(&mut self, address: &str) {
+        let address = match address.trim() {
+            "" => USUAL_ADDRESS,
+            address => address,
+        };
+        // Whoever was served is let go first: it may be the same port.
+        self.stop_serving();
+        match FoxgloveServer::open(address, &self.link()) {
+            Ok(server) => {
+                let at = server.address();
+                self.live.served_at = at;
+                *self
+                    .live
+                    .server
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner) = Some(server);
+                let at = at.map_or_else(|| address.to_owned(), |at| at.to_string());
+                self.tell(format!("Foxglove finds touches at ws://{at}"));
+            }
+            Err(why) => self.complain(format!("{why}. Choose another address")),
+        }
+    }
+
+    /// Serves nobody any more.
+    pub fn stop_serving(&mut self) {
+        self.live.served_at = None;
+        *self
+            .live
+            .server
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Replays a recording into a file of messages (MCAP) beside it.
+    pub fn write_messages(&mut self, recording: &Path) {
+        let Some(sensing) = self.sensing().map(Arc::clone) else {
+            return self.complain("Messages are made by the model of the gauges: connect first");
+        };
+        let (model, settings) = self.gauge_model(&sensing);
+        let (recording, link) = (recording.to_owned(), self.link());
+        let work = move |_: &_| {
+            let pipeline = crate::live::Pipeline::new(model, settings);
+            let path = recording.with_extension("mcap");
+            let log = McapLog::replace(&path, &link).map_err(Stop::Failed)?;
+            let written = write_messages(&recording, log, pipeline);
+            written.map_err(|e| Stop::Failed(format!("{e:#}")))?;
+            Ok(path)
+        };
+        // A file that was written is there whatever has changed since.
+        self.jobs.start(Task::Table, (), work, |s, (), path| {
+            s.tell(format!("The messages are in {}", path.display()));
+        });
+    }
+
+    /// The frame that places are in.
+    fn link(&self) -> String {
+        handover::link(&Provenance {
+            mesh_path: &self.document.mesh_path,
+            version: env!("CARGO_PKG_VERSION"),
+            taken_in: None,
+        })
+    }
+}
