@@ -167,7 +167,7 @@ impl SceneGpu {
         let through = frame.uniforms.look[0] < 1.0;
         let plain = shades.is_plain();
         let behind = if plain { frame.background } else { [0.0; 4] };
-        slot.pass(encoder, &self.pipelines, behind, through);
+        slot.pass(encoder, &self.pipelines, behind, (through, plain));
         if let Some(targets) = &mut slot.targets {
             let shade = &targets.shade;
             targets.shaded = shade.shade(queue, encoder, &self.shades, &shades);
@@ -262,7 +262,7 @@ impl SlotGpu {
         encoder: &mut wgpu::CommandEncoder,
         pipelines: &Pipelines,
         [r, g, b, a]: [f64; 4],
-        through: bool,
+        (through, plain): (bool, bool),
     ) {
         let (Some(targets), Some(mesh), Some((_, bind))) = (&self.targets, &self.mesh, &self.map)
         else {
@@ -283,7 +283,12 @@ impl SlotGpu {
                 view: &targets.depth,
                 depth_ops: Some(wgpu::Operations {
                     load: wgpu::LoadOp::Clear(1.0),
-                    store: wgpu::StoreOp::Store,
+                    // Corners are found by it.
+                    store: if plain {
+                        wgpu::StoreOp::Discard
+                    } else {
+                        wgpu::StoreOp::Store
+                    },
                 }),
                 stencil_ops: None,
             }),
