@@ -12,7 +12,7 @@ struct Shade {
     background: vec4f,  // premultiplied with alpha
     floor_middle: vec4f, // xyz: its middle (relative units), w: how dark its shadow is
     floor_right: vec4f, // xyz: along its map, a unit over half of its side
-    floor_front: vec4f,
+    floor_front: vec4f, // xyz: to its front, w: how many places around a pixel are looked at
     up: vec4f,
 };
 
@@ -22,8 +22,6 @@ struct Shade {
 @group(0) @binding(3) var obscurance: texture_2d<f32>;
 @group(0) @binding(4) var floor_map: texture_2d<f32>;
 @group(0) @binding(5) var floor_sampler: sampler;
-
-const TAPS: i32 = 10;
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
@@ -76,10 +74,11 @@ fn fs_obscurance(@builtin(position) place: vec4f) -> @location(0) vec4f {
     let reach = clamp(radius * shade.eye.w / length(to_eye), 4.0, shade.ambient.w);
     // Each of four neighbours looks between what the others look at; their mean has no pattern.
     let quarter = f32((half.x & 1) + 2 * (half.y & 1)) / 4.0;
+    let taps = i32(shade.floor_front.w);
     var sum = 0.0;
-    for (var k = 0; k < TAPS; k++) {
-        let share = (f32(k) + quarter + 0.125) / f32(TAPS);
-        let angle = 2.3999632 * (f32(k) + f32(TAPS) * quarter * 4.0);
+    for (var k = 0; k < taps; k++) {
+        let share = (f32(k) + quarter + 0.125) / f32(taps);
+        let angle = 2.3999632 * (f32(k) + f32(taps) * quarter * 4.0);
         let way = vec2i(round(reach * sqrt(share) * vec2f(cos(angle), sin(angle))));
         let v = seen_at(pixel + way) - p;
         let vv = dot(v, v) / (radius * radius);
@@ -88,7 +87,7 @@ fn fs_obscurance(@builtin(position) place: vec4f) -> @location(0) vec4f {
         let near = max(1.0 - vv, 0.0);
         sum += near * near * near * max(vn / (0.02 + vv), 0.0);
     }
-    let left = max(1.0 - shade.ambient.y * sum * 4.0 / f32(TAPS), 0.0);
+    let left = max(1.0 - shade.ambient.y * sum * 4.0 / f32(taps), 0.0);
     return vec4f(left, distance_of(own), 0.0, 1.0);
 }
 

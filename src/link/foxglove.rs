@@ -38,13 +38,13 @@ const AT_ONCE: usize = 64;
 const DATA: u8 = 1;
 
 type Choose = fn(&Request, Response) -> Result<Response, ErrorResponse>;
-type Hello = MidHandshake<ServerHandshake<TcpStream, Choose>>;
+type Greeting = MidHandshake<ServerHandshake<TcpStream, Choose>>;
 
 /// Serves touches.
 pub struct FoxgloveServer {
     listener: TcpListener,
     /// Those who have not said yet what they want.
-    coming: Vec<(Instant, Hello)>,
+    coming: Vec<(Instant, Greeting)>,
     viewers: Vec<Viewer>,
     touches: TouchMessages,
 }

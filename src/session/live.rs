@@ -3,14 +3,15 @@
 pub(super) mod feed;
 pub(super) mod gathering;
 mod known;
-pub(super) mod streaming;
+pub(super) mod served;
+mod streaming;
 pub(super) mod training;
 mod upkeep;
 
 pub use feed::{Feed, Recording, STRIPS_S, Strip};
 pub use gathering::{Awaited, Gathered};
 pub use known::{LEAST as LEAST_KNOWN, WANTED as WANTED_KNOWN};
-pub use streaming::USUAL_ADDRESS;
+pub use served::USUAL_ADDRESS;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -222,7 +223,7 @@ impl Session {
         let started = Connection::start(
             Listener::new(address, pipeline).knowing(truths),
             move |event| {
-                streaming::hear(&server, &event);
+                served::hear(&server, &event);
                 feed::hear(&shared, &event, &|| wake.now());
             },
             move |ended| {

@@ -85,8 +85,8 @@ pub fn draw(look: LimbLook<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
     for &(pane, rect) in panes {
         match pane {
             Pane::Limb => {
-                let hurried = overlay::is_hurried(look, ui);
-                overlay::paint_limb(look, ui, rect, Backdrop::Window, hurried);
+                let pace = overlay::pace(look, ui);
+                overlay::paint_limb(look, ui, rect, Backdrop::Window, pace);
             }
             Pane::Unrolled => overlay::paint_unrolled(look, ui, rect),
         }
@@ -121,7 +121,7 @@ fn draw_over(look: LimbLook<'_>, ui: &Ui, pane: Pane, rect: Rect) {
 
 /// The limb with all that belongs to it, for a picture.
 pub fn picture(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop) {
-    overlay::paint_limb(look, ui, rect, backdrop, false);
+    overlay::paint_limb(look, ui, rect, backdrop, overlay::PicturePace::Kept);
     let painter = &ui.painter_at(rect);
     jig::paint_jig(look, painter, Pane::Limb);
     bench::paint_bench(look, painter, Pane::Limb);

@@ -21,9 +21,29 @@ const EDGES: f32 = 0.6;
 /// Of a gauge's number (points).
 const MARK: f32 = 9.0;
 
-/// Whether the next picture has to come soon: the camera moves, or a hand is about to move something. Where it was the camera,
-/// one more frame is asked for, in which it stands.
-pub fn is_hurried(look: LimbLook<'_>, ui: &Ui) -> bool {
+/// How soon the next picture has to come.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum PicturePace {
+    /// What is seen moves, or is about to.
+    Moving,
+    Standing,
+    /// It is looked at for long, and closely.
+    Kept,
+}
+
+impl PicturePace {
+    /// How many places around a pixel are looked at for what takes light from it.
+    fn taps(self) -> f32 {
+        match self {
+            Self::Moving | Self::Standing => 10.0,
+            Self::Kept => 32.0,
+        }
+    }
+}
+
+/// Whether the camera moves, or a hand is about to move something. Where it was the camera, one more frame is asked for, in
+/// which it stands.
+pub fn pace(look: LimbLook<'_>, ui: &Ui) -> PicturePace {
     let camera = &look.view.camera;
     let camera = (
         camera.matrix(1.0).to_cols_array(),
@@ -39,11 +59,15 @@ pub fn is_hurried(look: LimbLook<'_>, ui: &Ui) -> bool {
     if moves {
         ui.ctx().request_repaint();
     }
-    moves || ui.input(|i| i.pointer.any_down())
+    if moves || ui.input(|i| i.pointer.any_down()) {
+        PicturePace::Moving
+    } else {
+        PicturePace::Standing
+    }
 }
 
 /// The limb itself, as the adapter draws it.
-pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop, hurried: bool) {
+pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop, pace: PicturePace) {
     let Some(built) = &look.scene.built else {
         return;
     };
@@ -71,8 +95,8 @@ pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop, h
         shown: Arc::clone(&built.shown),
         map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
         uniforms,
-        shading: shading(look, pixels(ui, rect), back),
-        hurried,
+        shading: shading(look, pixels(ui, rect), back, pace.taps()),
+        hurried: pace == PicturePace::Moving,
         background: back.to_array().map(|c| f64::from(c) / 255.0),
         size: pixels(ui, rect),
     };
@@ -81,7 +105,7 @@ pub fn paint_limb(look: LimbLook<'_>, ui: &Ui, rect: Rect, backdrop: Backdrop, h
 }
 
 /// How light falls: less of it into corners, and a shadow on the floor.
-fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shading {
+fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32, taps: f32) -> Shading {
     /// How far off walls take light, over the part's size.
     const REACH: f64 = 0.07;
     /// Of the picture's height: so far is looked over at most, however near the limb is.
@@ -114,7 +138,7 @@ fn shading(look: LimbLook<'_>, [width, height]: [u32; 2], back: Color32) -> Shad
                 .extend(dark)
                 .to_array(),
             floor_right: along(floor.stance.right()).extend(0.0).to_array(),
-            floor_front: along(floor.stance.front()).extend(0.0).to_array(),
+            floor_front: along(floor.stance.front()).extend(taps).to_array(),
             up: floor.stance.up().as_vec3().extend(0.0).to_array(),
         },
         floor: Arc::clone(floor),

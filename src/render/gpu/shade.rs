@@ -25,7 +25,8 @@ pub struct ShadeUniforms {
     pub background: [f32; 4],
     /// xyz: the middle of the floor (relative units); w: how dark its shadow is, 0 for none.
     pub floor_middle: [f32; 4],
-    /// Along the floor's map, a unit over half of its side; and to its front.
+    /// xyz: along the floor's map, a unit over half of its side, and to its front; w of the second: how many places around a
+    /// pixel are looked at for its corners.
     pub floor_right: [f32; 4],
     pub floor_front: [f32; 4],
     pub up: [f32; 4],

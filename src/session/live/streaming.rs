@@ -1,32 +1,15 @@
 //! Touches for others: as they come, and a recording's as messages.
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 
 use crate::io::handover;
 use crate::io::run::Provenance;
 use crate::job::Stop;
-use crate::link::{FoxgloveServer, McapLog, SessionEvent, write_messages};
+use crate::link::{FoxgloveServer, McapLog, write_messages};
 use crate::session::Session;
 use crate::session::jobs::Task;
-
-/// Who serves touches, shared with the listening thread.
-pub type ServerShared = Arc<Mutex<Option<FoxgloveServer>>>;
-
-/// Where touches are served where nobody says otherwise: what Foxglove proposes, on this machine alone.
-pub const USUAL_ADDRESS: &str = "127.0.0.1:8765";
-
-/// Serves what happened on the line.
-pub(super) fn hear(server: &ServerShared, event: &SessionEvent) {
-    let mut server = server.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(server) = server.as_mut() {
-        match event {
-            SessionEvent::Sample { update, .. } => server.sample(update),
-            SessionEvent::Turn { .. } => server.turn(),
-            _ => {}
-        }
-    }
-}
+use crate::session::live::served::USUAL_ADDRESS;
 
 impl Session {
     /// Serves touches at `HOST:PORT` to Foxglove from now on.

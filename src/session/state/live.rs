@@ -13,7 +13,7 @@ use crate::live::LiveUpdate;
 use crate::project::LiveKeys;
 use crate::session::live::feed::{Feed, FeedShared};
 use crate::session::live::gathering::{Awaited, Gathered};
-use crate::session::live::streaming::ServerShared;
+use crate::session::live::served::ServerShared;
 use crate::session::live::training::TrainedPair;
 use crate::session::slot::Slot;
 use crate::session::state::learned::Learnt;
