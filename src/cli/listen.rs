@@ -301,15 +301,16 @@ impl Output {
             taken_in: None,
         };
         let link = handover::link(&provenance);
+        let asked = args.foxglove.as_deref();
+        let server = asked.map(|address| FoxgloveServer::open(address, &link));
+        let refused = |why| anyhow::anyhow!("--foxglove {why}. Choose another address");
+        self.foxglove = server.transpose().map_err(refused)?;
+        // After what may be refused: a file that is begun stays.
         let log = args
             .mcap
             .as_deref()
             .map(|path| McapLog::create(path, &link));
         self.log = log.transpose().map_err(anyhow::Error::msg)?;
-        let asked = args.foxglove.as_deref();
-        let server = asked.map(|address| FoxgloveServer::open(address, &link));
-        let refused = |why| anyhow::anyhow!("--foxglove {why}. Choose another address");
-        self.foxglove = server.transpose().map_err(refused)?;
         if let Some(address) = self.foxglove.as_ref().and_then(FoxgloveServer::address) {
             say(&format!("Foxglove finds touches at ws://{address}"));
         }
@@ -318,7 +319,14 @@ impl Output {
 
     fn on_event(&mut self, event: &SessionEvent) -> anyhow::Result<()> {
         match event {
-            SessionEvent::State(state) => say(in_words(state)),
+            SessionEvent::State(state) => {
+                say(in_words(state));
+                if let Some(server) = self.foxglove.as_ref()
+                    && **state != ConnectionState::Live
+                {
+                    server.let_go();
+                }
+            }
             SessionEvent::Hello(hello) => self.greet(hello)?,
             SessionEvent::Message(text) | SessionEvent::Trouble(text) => say(text),
             // Nobody wants to find out afterwards.
@@ -335,9 +343,6 @@ impl Output {
             // What waits is written as soon as nothing more is there.
             SessionEvent::Turn { .. } => {
                 self.obey();
-                if let Some(server) = &mut self.foxglove {
-                    server.turn();
-                }
                 self.flush()?;
             }
         }
@@ -405,7 +410,7 @@ impl Output {
         }
         self.last_us = Some(update.time_us);
         self.log(update)?;
-        if let Some(server) = &mut self.foxglove {
+        if let Some(server) = &self.foxglove {
             server.sample(update);
         }
         let line = match &self.learned {

@@ -1,11 +1,14 @@
 //! Touches as they come, for Foxglove and whoever else speaks its WebSocket protocol (version 1,
 //! <https://github.com/foxglove/ws-protocol>): the messages of [`TouchMessages`], each topic for those who ask for it.
 //!
-//! Nothing here waits: whoever does not read misses messages, and is let go after a while.
+//! It has a thread of its own, on which nothing waits for anybody: whoever does not read misses messages, and is let go
+//! after a while, and whoever listens to the board is not held up.
 
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serde::Deserialize;
@@ -17,7 +20,7 @@ use tungstenite::http::{HeaderValue, StatusCode};
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Error, Message, WebSocket, accept_hdr_with_config};
 
-use super::touch_messages::{MessagesAt, TouchMessages, topics};
+use super::touch_messages::{MessagesAt, TOPICS, TouchMessages, topics};
 use crate::live::LiveUpdate;
 
 /// Names of the protocol; the newer program asks for the first. The messages used here are the same.
@@ -25,12 +28,16 @@ const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const HEADER: &str = "sec-websocket-protocol";
 /// How long somebody may take to ask for it.
 const HELLO: Duration = Duration::from_secs(5);
-/// How long somebody may read nothing.
+/// How long somebody may read nothing of what waits for them.
 const BEHIND: Duration = Duration::from_secs(10);
+/// How often it is looked whether somebody came or said something.
+const LOOK: Duration = Duration::from_millis(10);
+/// Samples that may wait for the thread: beyond, the newest are left out.
+const SAMPLES: usize = 1024;
 /// Connections at once.
 const MOST: usize = 32;
 /// Most that waits for one who does not read (bytes), and the longest that they may say.
-const WAITING: usize = 1 << 20;
+const WAITING: usize = 1 << 17;
 const LONGEST: usize = 1 << 16;
 /// What is heard of one at once, so that nobody holds up the rest.
 const AT_ONCE: usize = 64;
@@ -38,10 +45,18 @@ const AT_ONCE: usize = 64;
 const DATA: u8 = 1;
 
 type Choose = fn(&Request, Response) -> Result<Response, ErrorResponse>;
-type Greeting = MidHandshake<ServerHandshake<TcpStream, Choose>>;
+type Greeting = MidHandshake<ServerHandshake<WatchedStream, Choose>>;
 
-/// Serves touches.
+/// Serves touches, until it is dropped.
 pub struct FoxgloveServer {
+    address: Option<SocketAddr>,
+    /// What touches at a sample; nothing where nobody knows any more. Closed when it ends.
+    samples: Option<SyncSender<Option<LiveUpdate>>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// What its thread looks after.
+struct Room {
     listener: TcpListener,
     /// Those who have not said yet what they want.
     coming: Vec<(Instant, Greeting)>,
@@ -60,22 +75,82 @@ impl FoxgloveServer {
             Ok(listener)
         });
         let failed = |e| format!("{address}: nothing can be served there ({e})");
-        Ok(Self {
-            listener: listener.map_err(failed)?,
+        let listener = listener.map_err(failed)?;
+        let at = listener.local_addr().ok();
+        let room = Room {
+            listener,
             coming: Vec::new(),
             viewers: Vec::new(),
-            touches: TouchMessages::new(link),
+            touches: TouchMessages::new(link, true),
+        };
+        let (samples, inbox) = sync_channel(SAMPLES);
+        let thread = std::thread::Builder::new().name("foxglove".into());
+        let thread = thread.spawn(move || room.serve(&inbox)).map_err(failed)?;
+        Ok(Self {
+            address: at,
+            samples: Some(samples),
+            thread: Some(thread),
         })
     }
 
     /// Where it serves.
     #[must_use]
     pub fn address(&self) -> Option<SocketAddr> {
-        self.listener.local_addr().ok()
+        self.address
+    }
+
+    /// Sends what touches at a sample to those who ask for it.
+    pub fn sample(&self, update: &LiveUpdate) {
+        self.hand_over(Some(update.clone()));
+    }
+
+    /// Says that nothing is known to touch any more: the board is gone.
+    pub fn let_go(&self) {
+        self.hand_over(None);
+    }
+
+    fn hand_over(&self, sample: Option<LiveUpdate>) {
+        if let Some(samples) = &self.samples {
+            // Where it is full, the thread has no time: what it has comes first.
+            let _ = samples.try_send(sample);
+        }
+    }
+}
+
+impl Drop for FoxgloveServer {
+    fn drop(&mut self) {
+        // The port is free again when this is over.
+        self.samples = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Room {
+    fn serve(mut self, inbox: &Receiver<Option<LiveUpdate>>) {
+        let mut looked = Instant::now();
+        loop {
+            match inbox.recv_timeout(LOOK) {
+                Ok(sample) => {
+                    let now = match &sample {
+                        Some(update) => self.touches.of(update),
+                        None => self.touches.none(),
+                    };
+                    self.viewers.retain_mut(|viewer| viewer.tell(&now));
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            if looked.elapsed() >= LOOK {
+                looked = Instant::now();
+                self.turn();
+            }
+        }
     }
 
     /// Lets in who comes, hears what they ask for, and sends what waits.
-    pub fn turn(&mut self) {
+    fn turn(&mut self) {
         while let Ok((stream, _)) = self.listener.accept() {
             if self.coming.len() + self.viewers.len() < MOST {
                 self.greet(stream);
@@ -98,6 +173,10 @@ impl FoxgloveServer {
                 .max_write_buffer_size(WAITING)
                 .max_message_size(Some(LONGEST))
                 .max_frame_size(Some(LONGEST));
+            let stream = WatchedStream {
+                stream,
+                moved: Instant::now(),
+            };
             let asked = accept_hdr_with_config(stream, choose as Choose, Some(config));
             self.enter(Instant::now(), asked);
         }
@@ -106,7 +185,10 @@ impl FoxgloveServer {
     fn enter(
         &mut self,
         since: Instant,
-        asked: Result<WebSocket<TcpStream>, HandshakeError<ServerHandshake<TcpStream, Choose>>>,
+        asked: Result<
+            WebSocket<WatchedStream>,
+            HandshakeError<ServerHandshake<WatchedStream, Choose>>,
+        >,
     ) {
         match asked {
             Ok(socket) => self.viewers.extend(Viewer::new(socket)),
@@ -115,12 +197,31 @@ impl FoxgloveServer {
             Err(HandshakeError::Failure(_)) => {}
         }
     }
+}
 
-    /// Sends what touches at a sample to those who asked for it.
-    pub fn sample(&mut self, update: &LiveUpdate) {
-        // Also where nobody looks: the first sample says how the board's clock stands.
-        let now = self.touches.of(update);
-        self.viewers.retain_mut(|viewer| viewer.tell(&now));
+/// A connection, and when bytes went into it last.
+struct WatchedStream {
+    stream: TcpStream,
+    moved: Instant,
+}
+
+impl Read for WatchedStream {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        self.stream.read(buffer)
+    }
+}
+
+impl Write for WatchedStream {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = self.stream.write(bytes)?;
+        if written > 0 {
+            self.moved = Instant::now();
+        }
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.stream.flush()
     }
 }
 
@@ -169,20 +270,17 @@ struct Subscription {
 
 /// Somebody who looks.
 struct Viewer {
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<WatchedStream>,
     /// The topics asked for, by the number that they are asked for by.
     topics: BTreeMap<u32, usize>,
-    /// Since when nothing could be sent.
-    behind: Option<Instant>,
 }
 
 impl Viewer {
     /// Tells somebody who has just come what there is.
-    fn new(socket: WebSocket<TcpStream>) -> Option<Self> {
+    fn new(socket: WebSocket<WatchedStream>) -> Option<Self> {
         let mut viewer = Self {
             socket,
             topics: BTreeMap::new(),
-            behind: None,
         };
         let channels: Vec<_> = (0..)
             .zip(topics())
@@ -207,16 +305,11 @@ impl Viewer {
     /// Whether it is still there after something was sent.
     fn is_there(&mut self, sent: Result<(), Error>) -> bool {
         match sent {
-            Ok(()) => self.behind = None,
-            Err(Error::WriteBufferFull(_)) => self.fall_behind(),
-            Err(e) if waits(&e) => self.fall_behind(),
-            Err(_) => return false,
+            Ok(()) => true,
+            Err(Error::WriteBufferFull(_)) => self.socket.get_ref().moved.elapsed() < BEHIND,
+            Err(e) if waits(&e) => self.socket.get_ref().moved.elapsed() < BEHIND,
+            Err(_) => false,
         }
-        self.behind.is_none_or(|since| since.elapsed() < BEHIND)
-    }
-
-    fn fall_behind(&mut self) {
-        self.behind.get_or_insert_with(Instant::now);
     }
 
     /// Hears what is asked for and sends what waits; whether it is still there.
@@ -241,8 +334,8 @@ impl Viewer {
         let refused = |why: String| json!({ "op": "status", "level": 2, "message": why });
         match serde_json::from_str(text) {
             Ok(Asked::Subscribe { subscriptions }) => {
-                for Subscription { id, channel_id } in subscriptions {
-                    if channel_id >= topics().len() {
+                for Subscription { id, channel_id } in subscriptions.into_iter().take(MOST) {
+                    if channel_id >= TOPICS {
                         let why = format!("there is no channel {channel_id}");
                         if !self.say(&refused(why)) {
                             return false;

@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
 
-use super::touch_messages::{MessagesAt, TouchMessages, topics};
+use super::touch_messages::{MessagesAt, TOPICS, TouchMessages, topics};
 use crate::live::LiveUpdate;
 
 /// A file that is being written.
 pub struct McapLog {
     path: PathBuf,
     writer: Writer<BufWriter<File>>,
-    channels: [u16; 3],
+    channels: [u16; TOPICS],
     sequence: u32,
     touches: TouchMessages,
 }
@@ -51,7 +51,7 @@ impl McapLog {
         let options = WriteOptions::new().compression(None).library("hapdef");
         let writer = options.create(BufWriter::new(file));
         let mut writer = writer.map_err(|e| failed(&e))?;
-        let mut channels = [0; 3];
+        let mut channels = [0; TOPICS];
         for (channel, (topic, schema, fields)) in channels.iter_mut().zip(topics()) {
             let data = fields.to_string();
             let id = writer.add_schema(schema, "jsonschema", data.as_bytes());
@@ -64,7 +64,7 @@ impl McapLog {
             writer,
             channels,
             sequence: 0,
-            touches: TouchMessages::new(link),
+            touches: TouchMessages::new(link, false),
         })
     }
 

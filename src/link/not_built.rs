@@ -1,7 +1,9 @@
 //! What a build was made without: it says so, and costs nothing.
 
 use std::convert::Infallible;
+#[cfg(not(feature = "foxglove"))]
 use std::net::SocketAddr;
+#[cfg(not(feature = "mcap"))]
 use std::path::Path;
 
 use crate::live::LiveUpdate;
@@ -54,11 +56,11 @@ impl FoxgloveServer {
         match self.0 {}
     }
 
-    pub fn turn(&mut self) {
+    pub fn sample(&self, _: &LiveUpdate) {
         match self.0 {}
     }
 
-    pub fn sample(&mut self, _: &LiveUpdate) {
+    pub fn let_go(&self) {
         match self.0 {}
     }
 }

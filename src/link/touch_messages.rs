@@ -17,13 +17,20 @@ use crate::live::LiveUpdate;
 /// The frame at the hardest touch.
 const FRAME: &str = "contact";
 
-/// What makes messages of touches.
+/// How far the board's clock may leave that of the machine while touches are looked at as they come (ns).
+const APART_NS: u64 = 500_000_000;
+
+/// What makes messages of touches. Their time is the board's, from the moment of this machine at which it began; where its
+/// clock begins anew, so does that, and no message is earlier than the one before.
 pub struct TouchMessages {
     /// The frame that places are in.
     link: String,
-    /// Nanoseconds since 1970 when it was begun, and the board's clock at the first sample (µs).
-    begun_ns: u64,
-    first_us: Option<u64>,
+    /// Whether samples come as they are read, so that their time is now.
+    is_live: bool,
+    /// Nanoseconds since 1970 at a time of the board's clock (µs).
+    anchor: Option<(u64, u64)>,
+    last_us: u64,
+    last_ns: u64,
 }
 
 /// The messages of one sample.
@@ -35,21 +42,48 @@ pub struct MessagesAt {
 }
 
 impl TouchMessages {
-    /// From now on; `link` is the frame that places are in.
+    /// `link` is the frame that places are in.
     #[must_use]
-    pub fn new(link: &str) -> Self {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    pub fn new(link: &str, is_live: bool) -> Self {
         Self {
             link: link.to_owned(),
-            begun_ns: now.map_or(0, |d| d.as_nanos() as u64),
-            first_us: None,
+            is_live,
+            anchor: None,
+            last_us: 0,
+            last_ns: 0,
+        }
+    }
+
+    /// When a sample was read (ns since 1970), by what this machine's clock says as it comes.
+    fn at(&mut self, time_us: u64, now_ns: u64) -> u64 {
+        let began_anew = time_us < self.last_us;
+        let (wall, first) = *self.anchor.get_or_insert((now_ns, time_us));
+        let by_board = wall.saturating_add(time_us.saturating_sub(first).saturating_mul(1000));
+        let apart = self.is_live && by_board.abs_diff(now_ns) > APART_NS;
+        let at = if began_anew || apart {
+            let from = if self.is_live { now_ns } else { self.last_ns };
+            self.anchor = Some((from, time_us));
+            from
+        } else {
+            by_board
+        };
+        self.last_us = time_us;
+        self.last_ns = self.last_ns.max(at);
+        self.last_ns
+    }
+
+    /// That nothing touches any more, as far as anybody knows.
+    pub fn none(&mut self) -> MessagesAt {
+        self.last_ns = self.last_ns.max(now_ns());
+        MessagesAt {
+            at_ns: self.last_ns,
+            messages: vec![(0, json!({ "contacts": [] }))],
         }
     }
 
     /// What touches at a sample.
     pub fn of(&mut self, update: &LiveUpdate) -> MessagesAt {
-        let first = *self.first_us.get_or_insert(update.time_us);
-        let at_ns = self.begun_ns + update.time_us.saturating_sub(first) * 1000;
+        let at_ns = self.at(update.time_us, now_ns());
         let none = Vec::new();
         let touches = update.touches.as_ref().map_or(&none, |t| &t.contacts);
         let contacts: Vec<Value> = (1..)
@@ -64,6 +98,11 @@ impl TouchMessages {
         }
         MessagesAt { at_ns, messages }
     }
+}
+
+fn now_ns() -> u64 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    now.map_or(0, |d| d.as_nanos() as u64)
 }
 
 fn stamp(ns: u64, fraction: &str) -> Value {
@@ -118,8 +157,11 @@ fn transform(contact: &Contact, turn: &DMat3, link: &str, at: u64) -> Value {
     })
 }
 
+/// How many topics there are.
+pub(super) const TOPICS: usize = 3;
+
 /// Topics with the names and fields of their messages.
-pub(super) fn topics() -> [(&'static str, &'static str, Value); 3] {
+pub(super) fn topics() -> [(&'static str, &'static str, Value); TOPICS] {
     let number = json!({ "type": "number" });
     let text = json!({ "type": "string" });
     let object = |fields: Value| json!({ "type": "object", "properties": fields });
@@ -146,4 +188,35 @@ pub(super) fn topics() -> [(&'static str, &'static str, Value); 3] {
         ("/touch/wrench", "geometry_msgs/WrenchStamped", stamped),
         ("/tf", "foxglove.FrameTransform", transform),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const S: u64 = 1_000_000_000;
+
+    #[test]
+    fn time_is_of_the_machine_and_never_goes_back() {
+        let mut live = TouchMessages::new("shin", true);
+        // The board counts on; how late samples are read does not show.
+        assert_eq!(live.at(5_000_000, 100 * S), 100 * S);
+        assert_eq!(live.at(5_001_000, 100 * S + 9_000_000), 100 * S + 1_000_000);
+        // It begins anew, or another one is there, which has run for hours.
+        assert_eq!(live.at(1_000, 103 * S), 103 * S);
+        assert_eq!(live.at(2_000, 103 * S + 1_000_000), 103 * S + 1_000_000);
+        assert_eq!(live.at(9_000_000_000, 104 * S), 104 * S);
+        // The machine's clock is put back: no message is earlier.
+        assert_eq!(live.at(9_001_000_000, 50 * S), 104 * S);
+        assert!(live.none().at_ns >= 104 * S);
+    }
+
+    #[test]
+    fn a_recording_has_its_own_pace() {
+        let mut fast = TouchMessages::new("shin", false);
+        assert_eq!(fast.at(0, 100 * S), 100 * S);
+        assert_eq!(fast.at(60_000_000, 100 * S + 5), 160 * S);
+        assert_eq!(fast.at(0, 100 * S + 6), 160 * S);
+        assert_eq!(fast.at(1_000_000, 100 * S + 7), 161 * S);
+    }
 }

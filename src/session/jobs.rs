@@ -49,6 +49,7 @@ pub enum Task {
     /// Whether known touches fit each other.
     CheckKnown,
     Table,
+    Messages,
     /// Of the test-bed: a plan, and going through it.
     PlanPresses,
     Press,
@@ -89,6 +90,7 @@ impl Task {
             Self::Calibrate => "Calibrate".into(),
             Self::CheckKnown => "Check the known touches".into(),
             Self::Table => "Write the table".into(),
+            Self::Messages => "Write the messages".into(),
             Self::PlanPresses => "Plan the presses".into(),
             Self::Press => "Press the limb".into(),
             Self::Learn => "Learn from the presses".into(),
@@ -103,7 +105,7 @@ impl Task {
     pub fn writes(self) -> bool {
         matches!(
             self,
-            Self::Export | Self::Picture | Self::Save | Self::Table
+            Self::Export | Self::Picture | Self::Save | Self::Table | Self::Messages
         )
     }
 

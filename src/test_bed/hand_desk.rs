@@ -143,15 +143,23 @@ impl<'a> HandDesk<'a> {
     ) {
         // Beforehand a force is said for each place; else what is said last counts.
         let asks = self.force.is_none() || !self.ahead;
-        match asks.then(orders).flatten().and_then(|o| self.of_now(o)) {
+        let said = asks.then(orders).flatten();
+        let order = said.filter(|said| self.is_of_now(said));
+        if said.is_some() && order.is_none() {
+            tell(HandSays::TakenAlready);
+        }
+        match order.map(|said| said.order) {
             Some(HandOrder::Stop) => self.stopped = true,
             Some(HandOrder::Skip) => self.go_on(),
             Some(HandOrder::Elsewhere(place)) => self.move_to(place, tell),
             Some(HandOrder::Force(force)) => self.force = Some(force),
-            Some(HandOrder::AsMeant) => {
+            // An empty line too many, or that nobody can type any more.
+            Some(HandOrder::AsMeant)
+                if self.ahead || self.over.is_some() || self.presses.is_felt() =>
+            {
                 self.force.get_or_insert(self.plan.meant_n);
             }
-            None => {}
+            Some(HandOrder::AsMeant) | None => {}
         }
         if self.stopped || self.force.is_none() {
             return;
@@ -166,11 +174,11 @@ impl<'a> HandDesk<'a> {
         }
     }
 
-    /// What is said of the press of now, or of all.
-    fn of_now(&self, said: PressOrder) -> Option<HandOrder> {
+    /// Whether it is said of the press of now, or of all.
+    fn is_of_now(&self, said: &PressOrder) -> bool {
         let now = self.plan.left.get(self.at);
         let is_of_now = said.number.is_none_or(|number| now == Some(&number));
-        (is_of_now || said.order == HandOrder::Stop).then_some(said.order)
+        is_of_now || said.order == HandOrder::Stop
     }
 
     fn move_to(&mut self, place: Option<DVec3>, tell: &mut dyn FnMut(HandSays)) {
@@ -321,7 +329,7 @@ mod tests {
         let mut desk = desk(&plan, home.path(), false);
         assert_eq!(hear(&mut desk, over()), [HandSays::Taken(0, None)]);
         for order in [HandOrder::Skip, HandOrder::Elsewhere(Some(DVec3::ZERO))] {
-            assert!(say(&mut desk, of(0, order)).is_empty());
+            assert_eq!(say(&mut desk, of(0, order)), [HandSays::TakenAlready]);
         }
         assert_eq!((desk.at, desk.elsewhere), (1, None));
         say(&mut desk, of(2, HandOrder::Skip));

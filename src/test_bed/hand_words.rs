@@ -61,6 +61,8 @@ pub enum HandSays {
     Unsteady,
     /// A force was written, and no press waits for one.
     NothingWaits,
+    /// What was said is of a press that was taken meanwhile.
+    TakenAlready,
     /// It is written down: its number in the plan, with its force (N) where no sensor feels that.
     Taken(usize, Option<f64>),
     /// What the board or the connection says.
@@ -93,6 +95,7 @@ impl HandSays {
                 "it was not taken: leave the limb alone for a moment, then press again and hold it for a second".into()
             }
             Self::NothingWaits => "no press waits for a force".into(),
+            Self::TakenAlready => "that press was taken already, and this was not said of the next".into(),
             Self::Taken(_, Some(force)) => format!("taken, with {force} N"),
             Self::Taken(_, None) => "taken".into(),
         }

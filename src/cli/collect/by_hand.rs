@@ -33,8 +33,10 @@ pub fn run(
         let inbox = typed(&run, (!ahead).then(|| Arc::clone(&shown)));
         out::say("hapdef: waiting for the board; leave the limb alone until its rest is taken");
         run.press_at(board, (&mut || next(&inbox), ahead), |says| {
-            if let HandSays::Press { number, .. } = &says {
-                shown.store(*number, Ordering::Relaxed);
+            match &says {
+                HandSays::Press { number, .. } => shown.store(*number, Ordering::Relaxed),
+                HandSays::Wait => shown.store(NOTHING, Ordering::Relaxed),
+                _ => {}
             }
             say(&says, args.force_n());
         })?;

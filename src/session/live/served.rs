@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::link::{FoxgloveServer, SessionEvent};
+use crate::link::{ConnectionState, FoxgloveServer, SessionEvent};
 
 /// Who serves touches, shared with the listening thread.
 pub type ServerShared = Arc<Mutex<Option<FoxgloveServer>>>;
@@ -12,11 +12,11 @@ pub const USUAL_ADDRESS: &str = "127.0.0.1:8765";
 
 /// Serves what happened on the line.
 pub fn hear(server: &ServerShared, event: &SessionEvent) {
-    let mut server = server.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(server) = server.as_mut() {
+    let server = server.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(server) = server.as_ref() {
         match event {
             SessionEvent::Sample { update, .. } => server.sample(update),
-            SessionEvent::Turn { .. } => server.turn(),
+            SessionEvent::State(state) if **state != ConnectionState::Live => server.let_go(),
             _ => {}
         }
     }

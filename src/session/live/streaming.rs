@@ -56,13 +56,19 @@ impl Session {
         let work = move |_: &_| {
             let pipeline = crate::live::Pipeline::new(model, settings);
             let path = recording.with_extension("mcap");
-            let log = McapLog::replace(&path, &link).map_err(Stop::Failed)?;
-            let written = write_messages(&recording, log, pipeline);
-            written.map_err(|e| Stop::Failed(format!("{e:#}")))?;
+            // The older one stays until this is whole.
+            let begun = recording.with_extension("mcap.part");
+            let log = McapLog::replace(&begun, &link).map_err(Stop::Failed)?;
+            let written = write_messages(&recording, log, pipeline)
+                .and_then(|()| Ok(std::fs::rename(&begun, &path)?));
+            written.map_err(|e| {
+                let _ = std::fs::remove_file(&begun);
+                Stop::Failed(format!("{}: {e:#}", path.display()))
+            })?;
             Ok(path)
         };
         // A file that was written is there whatever has changed since.
-        self.jobs.start(Task::Table, (), work, |s, (), path| {
+        self.jobs.start(Task::Messages, (), work, |s, (), path| {
             s.tell(format!("The messages are in {}", path.display()));
         });
     }

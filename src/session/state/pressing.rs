@@ -214,7 +214,11 @@ impl PressingPlan {
                 let step = self.hand.map_or(HandStep::Press, |(step, _)| step);
                 self.hand = Some((step, *at));
             }
-            HandSays::Wait => self.hand = Some((HandStep::Wait, moved)),
+            HandSays::Wait => {
+                self.hand = Some((HandStep::Wait, moved));
+                // What is said meanwhile is of whichever is next.
+                self.asked_for = None;
+            }
             HandSays::LetGo => self.hand = Some((HandStep::LetGo, moved)),
             HandSays::HowHard => self.hand = Some((HandStep::TellForce, moved)),
             HandSays::Taken(number, _) => self.set(*number, PressState::Made),
@@ -222,7 +226,10 @@ impl PressingPlan {
                 self.hand = Some((HandStep::Press, moved));
                 self.say(says.in_words(meant_n));
             }
-            HandSays::OffTheWall(_) | HandSays::NothingWaits | HandSays::Board(_) => {
+            HandSays::OffTheWall(_)
+            | HandSays::NothingWaits
+            | HandSays::TakenAlready
+            | HandSays::Board(_) => {
                 self.say(says.in_words(meant_n));
             }
         }

@@ -14,7 +14,7 @@ use crate::board::Illness;
 use crate::link::{PortInfo, ports};
 use crate::live::ShownEstimator;
 use crate::project::LiveKeys;
-use crate::session::{Desk, Mishap, USUAL_ADDRESS};
+use crate::session::{Desk, Mishap, Task, USUAL_ADDRESS};
 
 /// What is typed at the live stage.
 #[derive(Default)]
@@ -40,6 +40,10 @@ pub fn live_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
         ui.collapsing("Channels of the gauges", |ui| channels(ui, live, gauges));
     });
     ui.collapsing("Known touches", |ui| known_form(ask, ui));
+    let live = &ask.session.live;
+    if live.is_connected() || live.served_at.is_some() {
+        ui.collapsing("Messages for robots", |ui| messages_form(ask, form, ui));
+    }
 }
 
 fn board_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
@@ -241,7 +245,6 @@ fn recording_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
             ask.act(FileAction::WriteTable(path));
         }
     });
-    messages_form(ask, form, ui);
     if let Some(recording) = recording {
         let text = format!(
             "{}: {} samples, {:.0} kB",
@@ -255,7 +258,8 @@ fn recording_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
 
 /// Touches for robots and their tools.
 fn messages_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
-    rows(ui, "Messages", |ui| {
+    let rows = egui::Grid::new("messages").num_columns(2);
+    rows.spacing([10.0, 5.0]).show(ui, |ui| {
         let name = ui.label("Foxglove");
         let served = ask.session.live.served_at;
         ui.horizontal(|ui| {
@@ -274,8 +278,9 @@ fn messages_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
             }
         });
         ui.end_row();
-        let recording = ask.session.live.look(|f| f.recording.is_some()) == Some(true);
-        let last = ask.session.live.recorded.clone().filter(|_| !recording);
+        let busy = ask.session.live.look(|f| f.recording.is_some()) == Some(true)
+            || ask.session.jobs.runs(Task::Messages);
+        let last = ask.session.live.recorded.clone().filter(|_| !busy);
         ui.label("");
         let help = "The touches of the last recording as messages of ROS (.mcap) beside it, for Foxglove and other readers";
         let button = egui::Button::new("Write messages");
