@@ -183,6 +183,7 @@ impl Session {
             );
         }
         let was_live = self.live.is_connected();
+        let was_served = self.live.served_at;
         self.replace(opened.document, opened.shape);
         self.news.leave();
         for said in opened.said {
@@ -190,6 +191,9 @@ impl Session {
         }
         if was_live {
             self.tell("The board was hung up: its readings were taken for the part that was open before. Connect again");
+        }
+        if let Some(address) = was_served {
+            self.tell(format!("Touches are not served at ws://{address} any more: they were of the part that was open before"));
         }
         self.news.happened(Happening::Opened {
             file: opened.file,
