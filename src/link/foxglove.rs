@@ -56,7 +56,7 @@ pub struct FoxgloveServer {
 }
 
 /// What its thread looks after.
-struct Room {
+struct ServerThread {
     listener: TcpListener,
     /// Those who have not said yet what they want.
     coming: Vec<(Instant, Greeting)>,
@@ -77,7 +77,7 @@ impl FoxgloveServer {
         let failed = |e| format!("{address}: nothing can be served there ({e})");
         let listener = listener.map_err(failed)?;
         let at = listener.local_addr().ok();
-        let room = Room {
+        let room = ServerThread {
             listener,
             coming: Vec::new(),
             viewers: Vec::new(),
@@ -127,7 +127,7 @@ impl Drop for FoxgloveServer {
     }
 }
 
-impl Room {
+impl ServerThread {
     fn serve(mut self, inbox: &Receiver<Option<LiveUpdate>>) {
         let mut looked = Instant::now();
         loop {
