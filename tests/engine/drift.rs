@@ -240,7 +240,7 @@ fn slow_boards_are_followed_too() {
         let presses = [press(3, 3.0, 60.0, 200.0)];
         let seen = Seen::of(world, &presses, 400.0);
         assert!(
-            rate < 20.0
+            rate < 10.0
                 || seen.shown > 0.98 * seen.pressed
                     && seen.ghosts == 0.0
                     && seen.off_n < 0.6 * seen.shown,
