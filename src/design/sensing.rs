@@ -2,6 +2,7 @@
 
 mod kept;
 
+use std::collections::HashSet;
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
@@ -14,13 +15,14 @@ use super::drawn::{drawn_on, map_size, proposed};
 use super::layout::{lay_out_sites, lay_out_touches, test_touches, touches_on};
 use super::nearness::check_on_part;
 use super::{Built, DesignError, Ground, Inputs, Meshed, ground};
-use crate::budget::{Budget, MAP_TRIANGLES, Watch};
+use crate::budget::{Budget, Cancelled, MAP_TRIANGLES, Watch};
 use crate::dataset::SignalMatrix;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Model, Touch};
 use crate::gauge::Gauge;
 use crate::inference::{AsDrawn, Deviations};
 use crate::live::GaugeModel;
+use crate::mesh::TriMesh;
 use crate::project::{ChosenSite, LiveKeys, Project};
 use crate::uncertainty::{Gluing, Uncertainty};
 use crate::units;
@@ -99,38 +101,94 @@ impl Workshop {
 /// # Errors
 /// [`DesignError`] as for a simulation, and where no gauges are chosen.
 pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, DesignError> {
-    let project = &inputs.project;
-    project.check()?;
-    if project.selection.sites.is_empty() {
-        return Err(DesignError::NoGauges);
-    }
-    check_chosen(inputs)?;
-    let (ground, graded) = graded_model(inputs, budget, watch)?;
-    let gauges = chosen_gauges(project, &*graded.model);
-    let grid = project.gauge.grid();
-    let sensitivity = Sensitivity::new(&*graded.model, &gauges, grid, watch)?;
-    let tip_radius = project.tip().1;
-    let mesh = ground.of_size(map_size(&ground, tip_radius, MAP_TRIANGLES));
-    let strain_percent = graded.estimate.strain_percent;
-    let off = (project.uncertainty()).with_elements(strain_percent);
-    let tip = (tip_radius, &off.making_at_most());
-    let drawn = drawn_on(&*graded.model, (&gauges, grid), &mesh, tip, watch)?;
+    let gauged = GaugedModel::new(inputs, budget, watch)?;
+    let model = &*gauged.built.model;
+    let sensitivity = Sensitivity::new(model, &gauged.gauges, gauged.grid, watch)?;
+    let drawn = gauged.drawn_on(&gauged.map_mesh, watch)?;
     let proposed = proposed(&drawn.map.mesh, inputs)?;
+    let GaugedModel { built, off, .. } = gauged;
     Ok(Sensing {
-        sites: project.selection.sites.clone(),
-        gauges,
-        grid,
+        sites: inputs.project.selection.sites.clone(),
+        gauges: gauged.gauges,
+        grid: gauged.grid,
         sensitivity: Arc::new(sensitivity),
         deviations: drawn.deviations(&off),
         off,
         drawn: Arc::new(drawn),
         proposed,
-        element_mm: graded.meshed.element_mm(),
-        strain_percent,
-        is_short: graded.is_short,
+        element_mm: built.meshed.element_mm(),
+        strain_percent: built.estimate.strain_percent,
+        is_short: built.is_short,
         budget: *budget,
-        meshed: OnceLock::from(graded.meshed),
+        meshed: OnceLock::from(built.meshed),
     })
+}
+
+/// What the chosen gauges read where some places (m) are, as [`sensing`] knows it everywhere: enough to compare presses there with
+/// many models of a part.
+///
+/// # Errors
+/// As [`sensing`].
+pub fn drawn_at(
+    inputs: &Inputs,
+    budget: &Budget,
+    places: &[DVec3],
+    watch: Watch,
+) -> Result<AsDrawn, DesignError> {
+    let gauged = GaugedModel::new(inputs, budget, watch)?;
+    let around = around(&gauged.map_mesh, places);
+    Ok(gauged.drawn_on(&around, watch)?)
+}
+
+/// Of a mesh the triangles nearest to some places (m), with all that share a corner with them: there it has the normals that
+/// it has as a whole.
+fn around(mesh: &Arc<TriMesh>, places: &[DVec3]) -> Arc<TriMesh> {
+    let nearest = places.iter().map(|&place| mesh.index().nearest(place).0);
+    let corners = nearest.flat_map(|at| mesh.triangles()[at.triangle as usize]);
+    let of_corner = |corner: u32| &mesh.vertex_triangles()[corner as usize];
+    let kept: HashSet<u32> = corners.flat_map(of_corner).copied().collect();
+    let part = mesh.part_of(|t| kept.contains(&t));
+    part.map_or_else(|| Arc::clone(mesh), |(part, _)| Arc::new(part))
+}
+
+/// A project's chosen gauges on a model of its part, before anything is pressed.
+struct GaugedModel {
+    built: Built,
+    gauges: Vec<Gauge>,
+    /// Length and width (m) of their grids.
+    grid: [f64; 2],
+    /// What readings are known on, where they are known everywhere.
+    map_mesh: Arc<TriMesh>,
+    tip_radius: f64,
+    off: Uncertainty,
+}
+
+impl GaugedModel {
+    fn new(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Self, DesignError> {
+        let project = &inputs.project;
+        project.check()?;
+        if project.selection.sites.is_empty() {
+            return Err(DesignError::NoGauges);
+        }
+        check_chosen(inputs)?;
+        let (ground, built) = graded_model(inputs, budget, watch)?;
+        let tip_radius = project.tip().1;
+        Ok(Self {
+            gauges: chosen_gauges(project, &*built.model),
+            grid: project.gauge.grid(),
+            map_mesh: ground.of_size(map_size(&ground, tip_radius, MAP_TRIANGLES)),
+            tip_radius,
+            off: (project.uncertainty()).with_elements(built.estimate.strain_percent),
+            built,
+        })
+    }
+
+    /// What the gauges read of presses on a mesh.
+    fn drawn_on(&self, mesh: &Arc<TriMesh>, watch: Watch) -> Result<AsDrawn, Cancelled> {
+        let gauges = (&self.gauges[..], self.grid);
+        let tip = (self.tip_radius, &self.off.making_at_most());
+        drawn_on(&*self.built.model, gauges, mesh, tip, watch)
+    }
 }
 
 /// Refuses chosen gauges ([[selection.site]]) that lie on no surface of the part.

@@ -158,37 +158,40 @@ struct StandingTip {
 }
 
 impl StandingTip {
-    /// Which of the pieces of a row the tip may reach: all that it does, and few others. The row goes from `start` by
-    /// `step` a piece, and is so `wide` (m).
-    fn over_row(&self, start: DVec3, step: DVec3, wide: f64, count: usize) -> Range<usize> {
-        let (off, reach) = (self.centre - start, self.radius + wide);
+    /// Which of the places of a row the tip may reach: all that it does, and few others. The row goes from `start` by
+    /// `step` a place.
+    fn over_row(&self, start: DVec3, step: DVec3, count: usize) -> Range<usize> {
+        let off = self.centre - start;
         let nearest = off.dot(step) / step.length_squared();
         if !nearest.is_finite() {
             return 0..count;
         }
         let aside = off.distance(step * nearest);
-        if aside > reach {
+        if aside > self.radius {
             return 0..0;
         }
-        let half = (reach * reach - aside * aside).sqrt() / step.length();
-        // A piece more on either side, for what rounding takes. Below nothing, `as` is nothing.
+        let half = (self.radius * self.radius - aside * aside).sqrt() / step.length();
+        // A place more on either side, for what rounding takes. Below nothing, `as` is nothing.
         let (first, end) = (nearest - half - 1.0, nearest + half + 2.0);
         (first as usize).min(count)..(end as usize).min(count)
     }
 
-    /// The pieces that it may reach of a triangle split into `n` a side.
-    fn over(&self, ends: &[DVec3; 3], n: usize) -> impl Iterator<Item = FacetPiece> {
-        let [across, along] = [1, 2].map(|k| (ends[k] - ends[0]) / n as f64);
-        (0..n).flat_map(move |i| {
-            let start = ends[0] + across * i as f64;
-            let reached = self.over_row(start, along, across.length(), n - i);
-            row(n, i, reached)
-        })
+    /// Tells of the places that it may reach of a triangle with so many steps a side: each by its steps along two of these
+    /// from the first corner, and where it is (m).
+    fn over(&self, ends: &[DVec3; 3], steps: usize, mut tell: impl FnMut([usize; 2], DVec3)) {
+        let [across, along] = [1, 2].map(|k| (ends[k] - ends[0]) / steps as f64);
+        for a in 0..=steps {
+            let start = ends[0] + across * a as f64;
+            for b in self.over_row(start, along, steps - a + 1) {
+                tell([a, b], start + along * b as f64);
+            }
+        }
     }
 }
 
-/// Tells of the pressure on a piece of a facet, split into equal pieces with the three-point rule on each: no more of
-/// them a side than are taken at once.
+/// Tells of the pressure on a piece of a facet, split into equal triangles with the three-point rule on each, at the middles
+/// of its sides: no more of them a side than are taken at once. Corners and middles together are a lattice of twice as many
+/// steps, in which those are the corners that have even numbers.
 fn integrate(
     mesh: &TriMesh,
     t: u32,
@@ -216,20 +219,23 @@ fn integrate(
     let n = n as usize;
     let area = (ends[1] - ends[0]).cross(ends[2] - ends[0]).length() / 2.0;
     let share = area / (n * n) as f64 / 3.0;
-    for small in tip.over(&ends, n) {
-        for k in 0..3 {
-            let middle = std::array::from_fn(|i| f64::midpoint(small[k][i], small[(k + 1) % 3][i]));
-            let zeta = within(piece, &middle);
-            let r2 = point(&zeta).distance_squared(tip.centre) / tip.radius.powi(2);
-            if r2 < 1.0 {
-                let at = SurfacePoint {
-                    triangle: t,
-                    barycentric: zeta,
-                };
-                tell(at, (1.0 - r2).powi(2) * share);
-            }
+    let steps = 2 * n;
+    tip.over(&ends, steps, |[a, b], place| {
+        let r2 = place.distance_squared(tip.centre) / tip.radius.powi(2);
+        let is_corner = a % 2 == 0 && b % 2 == 0;
+        if is_corner || r2 >= 1.0 {
+            return;
         }
-    }
+        let [u, v] = [a, b].map(|k| k as f64 / steps as f64);
+        let at = SurfacePoint {
+            triangle: t,
+            barycentric: within(piece, &[(1.0 - u - v).max(0.0), u, v]),
+        };
+        // But for those at the rim, a side is one of two triangles.
+        let is_rim = a == 0 || b == 0 || a + b == steps;
+        let sides = if is_rim { 1.0 } else { 2.0 };
+        tell(at, sides * (1.0 - r2).powi(2) * share);
+    });
 }
 
 /// Coordinates in the facet of a point given by those in a piece of it.
@@ -239,16 +245,12 @@ fn within(piece: &FacetPiece, zeta: &[f64; 3]) -> [f64; 3] {
 
 /// The n² equal triangles of a split facet, by the barycentric coordinates of their corners.
 pub(super) fn pieces(n: usize) -> impl Iterator<Item = FacetPiece> {
-    (0..n).flat_map(move |i| row(n, i, 0..n - i))
-}
-
-/// Those of them in one row, at some places of it.
-fn row(n: usize, i: usize, places: Range<usize>) -> impl Iterator<Item = FacetPiece> {
     let at = move |i: usize, j: usize| {
         let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);
         [1.0 - u - v, u, v]
     };
-    places.flat_map(move |j| {
+    let places = (0..n).flat_map(move |i| (0..n - i).map(move |j| (i, j)));
+    places.flat_map(move |(i, j)| {
         let up = [at(i, j), at(i + 1, j), at(i, j + 1)];
         let down = [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
         std::iter::once(up).chain((i + j + 1 < n).then_some(down))
@@ -277,7 +279,7 @@ mod tests {
     /// is looked at for that follows the tip and not the facet.
     #[test]
     fn what_a_tip_reaches_of_a_facet_is_found_without_looking_at_all_of_it() {
-        const A_SIDE: usize = 64;
+        const A_SIDE: usize = 128;
         let tall = |x: f64, y: f64| DVec3::new(x, y, 0.01 * x);
         for third in [(0.0, 64.0), (60.0, 0.5), (32.0, 1e-9), (-500.0, 20.0)] {
             let mut ends = [tall(0.0, 0.0), tall(64.0, 0.0), tall(third.0, third.1)];
@@ -289,17 +291,46 @@ mod tests {
                     radius: 4.0,
                     grain: 1.0,
                 };
-                let point = |zeta: &[f64; 3]| -> DVec3 { (0..3).map(|i| ends[i] * zeta[i]).sum() };
-                let reached = |piece: &FacetPiece| {
-                    (0..3).any(|k| point(&piece[k]).distance(tip.centre) < tip.radius)
+                let place = |[a, b]: [usize; 2]| {
+                    let [u, v] = [a, b].map(|k| k as f64 / A_SIDE as f64);
+                    ends[0] * (1.0 - u - v) + ends[1] * u + ends[2] * v
                 };
-                let looked_at: Vec<FacetPiece> = tip.over(&ends, A_SIDE).collect();
-                let found: Vec<FacetPiece> = looked_at.iter().copied().filter(reached).collect();
-                let all: Vec<FacetPiece> = pieces(A_SIDE).filter(reached).collect();
-                assert_eq!(found, all, "{third:?} {turn}");
-                let few = 3 * all.len() + 6 * A_SIDE;
+                let lattice = (0..=A_SIDE).flat_map(|a| (0..=A_SIDE - a).map(move |b| [a, b]));
+                let reached = |at: &[usize; 2]| place(*at).distance(tip.centre) < tip.radius;
+                let all: Vec<[usize; 2]> = lattice.filter(reached).collect();
+                let mut looked_at = Vec::new();
+                tip.over(&ends, A_SIDE, |at, is| looked_at.push((at, is)));
+                for (at, is) in &looked_at {
+                    assert!(place(*at).distance(*is) < 1e-12, "{third:?} {turn}");
+                }
+                let found = looked_at.iter().map(|(at, _)| *at).filter(reached);
+                assert_eq!(found.collect::<Vec<_>>(), all, "{third:?} {turn}");
+                let few = all.len() + 4 * A_SIDE;
                 assert!(looked_at.len() < few, "{} {few}", looked_at.len());
             }
+        }
+    }
+
+    /// The pressure over a whole tip in the middle of a facet is what its integral says: q ∝ (1 - r²/a²)² has π a²/3.
+    #[test]
+    fn pressure_adds_up_to_its_integral() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
+        for grain in [0.05, 0.025, 0.0125] {
+            let tip = StandingTip {
+                centre: DVec3::new(0.3, 0.3, 0.0),
+                radius: 0.2,
+                grain,
+            };
+            let (mut total, mut middle) = (0.0, DVec3::ZERO);
+            integrate(&mesh, 0, &WHOLE, &tip, AT_ONCE, &mut |at, share| {
+                total += share;
+                middle += share * mesh.point(at);
+            });
+            let exact = std::f64::consts::PI * 0.2_f64.powi(2) / 3.0;
+            let off = (total / exact - 1.0).abs();
+            assert!(off < 3.0 * (grain / 0.2).powi(4), "{grain}: {off}");
+            assert!((middle / total).distance(tip.centre) < 1e-3 * grain);
         }
     }
 

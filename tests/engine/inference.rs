@@ -12,8 +12,8 @@ use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::inference::calibration::noise_of_mean;
 use hapdef::inference::{
-    AsGlued, Features, KnownPress, LiveLessons, Matching, ReadingErrors, TrainedLive, calibrate,
-    cramer_rao,
+    AsDrawn, AsGlued, Features, KnownPress, LiveLessons, Matching, ReadingErrors, ResponseMap,
+    TrainedLive, calibrate, cramer_rao,
 };
 use hapdef::live::{Health, Input, LiveUpdate, Pipeline, Receiver};
 use hapdef::regression::Hyper;
@@ -367,4 +367,28 @@ fn the_same_on_any_number_of_threads() {
         })
     };
     assert_eq!(run(1), run(3));
+}
+
+/// A model that is only pressed where presses were says of them what one says that is pressed everywhere.
+#[test]
+fn pressed_at_some_places_a_model_says_there_what_it_says_everywhere() {
+    let Lab { inputs, sensing } = lab();
+    let places: Vec<_> = touches(6, 5, 1.0).iter().map(|t| t.position).collect();
+    let budget = Quality::Draft.budget();
+    let near = design::drawn_at(inputs, &budget, &places, &unwatched).unwrap();
+    let whole = &sensing.drawn;
+    assert!(20 * near.map.mesh.triangles().len() < whole.map.mesh.triangles().len());
+    let said = |of: &AsDrawn| -> Vec<Vec<f64>> {
+        let maps = std::iter::once(&of.map).chain(&of.tip).map(|map| &**map);
+        let maps = maps.chain(&of.changes).chain(of.axes.as_deref().unwrap());
+        let at = |map: &ResponseMap, place| map.at(map.mesh.index().nearest(place).0);
+        maps.flat_map(|map| places.iter().map(move |&place| at(map, place)))
+            .collect()
+    };
+    for (near, whole) in said(&near).iter().zip(said(whole)) {
+        let largest = whole.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        for (here, there) in near.iter().zip(whole) {
+            assert!((here - there).abs() < 1e-9 * largest, "{here} {there}");
+        }
+    }
 }

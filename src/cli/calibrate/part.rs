@@ -6,17 +6,19 @@
 
 use anyhow::Context as _;
 use clap::ValueEnum;
+use glam::DVec3;
 
 use super::summary::{FittedBedding, PressRow, Summary};
 use crate::cli::common::Common;
 use crate::cli::progress::Bar;
 use crate::design::{self, Inputs, Sensing};
-use crate::inference::KnownPress;
 use crate::inference::calibration::likeliest::{LogLattice, likeliest};
 use crate::inference::calibration::part::of_part;
+use crate::inference::{AsDrawn, KnownPress};
 use crate::io::project_file::LoadedProject;
 use crate::project::{PartModel, Project, SupportKeys, SupportKind};
 use crate::uncertainty::Uncertainty;
+use crate::units;
 
 /// What may be fitted of a part.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
@@ -191,9 +193,17 @@ impl Trials<'_> {
 
     /// The logarithm of how likely the presses are. A part that cannot be computed is not the one that was pressed.
     fn evidence(&self, inputs: &Inputs) -> f64 {
-        let found = self.sensing(inputs).ok().and_then(|sensing| {
-            let known = known(self.rows, &sensing);
-            of_part(&sensing.drawn, &known, self.noise, self.off)
+        let places: Vec<DVec3> = used(self.rows)
+            .map(|(row, _)| units::from_mm(row.place))
+            .collect();
+        let watch = |p| self.bar.show(p);
+        let budget = inputs.project.budget.budget();
+        let drawn = self
+            .common
+            .in_pool(|| Ok(design::drawn_at(inputs, &budget, &places, &watch)?));
+        let found = drawn.ok().and_then(|drawn| {
+            let known = known(self.rows, &drawn);
+            of_part(&drawn, &known, self.noise, self.off)
         });
         found.map_or(f64::NEG_INFINITY, |f| f.evidence)
     }
@@ -214,14 +224,19 @@ impl Trials<'_> {
 }
 
 /// The presses on a model's own surface.
-fn known(rows: &[PressRow], sensing: &Sensing) -> Vec<KnownPress> {
-    let mesh = &sensing.drawn.map.mesh;
-    let known = rows.iter().filter(|row| row.used).filter_map(|row| {
-        let known = row.known.clone()?;
-        let at = mesh.index().nearest(row.place * 1e-3).0;
-        Some(KnownPress { at, ..known })
+fn known(rows: &[PressRow], drawn: &AsDrawn) -> Vec<KnownPress> {
+    let mesh = &drawn.map.mesh;
+    let known = used(rows).map(|(row, known)| KnownPress {
+        at: mesh.index().nearest(units::from_mm(row.place)).0,
+        ..known.clone()
     });
     known.collect()
+}
+
+/// The presses that are heeded, and what was read of them.
+fn used(rows: &[PressRow]) -> impl Iterator<Item = (&PressRow, &KnownPress)> {
+    let used = rows.iter().filter(|row| row.used);
+    used.filter_map(|row| Some((row, row.known.as_ref()?)))
 }
 
 const UNSAID: &str = "the presses do not say how thick the wall is: press at more places, with a force that is known, or leave thickness out of --fit";
