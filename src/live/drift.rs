@@ -17,6 +17,7 @@ use std::collections::VecDeque;
 
 use nalgebra::DMatrix;
 
+use super::feeling::BEGINS;
 use crate::inference::{SeveralTouches, TouchKind};
 
 use self::creep::Creep;
@@ -29,6 +30,8 @@ const BLOCK_S: f64 = 0.01;
 const BELIEVED_S: f64 = 0.2;
 /// The same of the first rest after a load: until then nobody knows what that hid, and another touch would go unfelt.
 const SOON_S: f64 = 0.06;
+/// Samples that have to follow rest before it is believed, however long they take: as many as a touch has before it is felt.
+const FOLLOWED_BY: f64 = BEGINS as f64;
 /// As long before a touch nothing of it is felt yet: what a rest that was too short to be believed says.
 const BEFORE_S: f64 = 0.05;
 /// Standard deviations, and strain, by which rest may be off from what follows it: beyond them a touch goes or comes.
@@ -164,7 +167,7 @@ impl Drift {
     fn believe(&mut self, ago_s: f64, noise: &[f64], used: &[bool]) {
         let until = self.now_s - ago_s;
         let old = |block: &RestBlock| block.ends_s <= until;
-        while self.waiting.front().is_some_and(old) {
+        while self.waiting.front().is_some_and(old) && self.following() >= FOLLOWED_BY {
             let steady = self.is_steady(noise, used);
             let Some(block) = self.waiting.pop_front() else {
                 return;
@@ -189,6 +192,11 @@ impl Drift {
                 self.walk.learn(&correction, self.as_of_s);
             }
         }
+    }
+
+    /// Samples that wait after the oldest block.
+    fn following(&self) -> f64 {
+        self.waiting.iter().skip(1).map(|b| b.samples).sum()
     }
 
     /// Whether the oldest block that waits is what those after it are, in the mean.

@@ -1,7 +1,7 @@
 //! Whether anything touches: weighted squares against χ² of the channels, with a few samples of patience.
 
 /// Samples in a row that make or end a touch.
-const BEGINS: u32 = 3;
+pub(super) const BEGINS: u32 = 3;
 const ENDS: u32 = 6;
 /// Of the squares that a touch usually has: what is less is hardly the same touch; and the share of a sample in these.
 const GONE: f64 = 0.25;

@@ -84,3 +84,22 @@ impl Release {
         (self.looks, self.asked) = (0, None);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where nobody has come back to the rest so far a pull is believed at once; where somebody has, only when it lasts.
+    #[test]
+    fn a_rest_that_was_proved_is_not_doubted_for_a_moment() {
+        let seen = |looks: u32, ms: u64| Release {
+            looks,
+            seen: [5_000, 5_000 + 1000 * ms],
+            asked: None,
+        };
+        assert!(!seen(LOOKS - 1, 5000).is_sure(false));
+        assert!(seen(LOOKS, 2).is_sure(false));
+        assert!(!seen(LOOKS, 900).is_sure(true));
+        assert!(seen(LOOKS, 1000).is_sure(true));
+    }
+}
