@@ -44,6 +44,7 @@ pub use ports::{PortInfo, ports};
 pub use pressed::{BenchPress, bench_presses};
 pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
+pub use replay::RecordingExtent;
 pub use rewritten::{write_messages, write_table};
 pub use session::{Connection, ConnectionState, Listener, ListenerCommand, SessionEvent, Timing};
 pub use table::SampleTable;

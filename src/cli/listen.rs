@@ -26,7 +26,7 @@ use crate::io::touch_file::{self, TouchFile};
 use crate::io::{handover, kept_model};
 use crate::link::{
     Address, BAUD, ConnectionState, FoxgloveServer, Listener, ListenerCommand, McapLog, Pace,
-    Recorder, SampleTable, SessionEvent,
+    Recorder, RecordingExtent, SampleTable, SessionEvent,
 };
 use crate::live::{LiveUpdate, Pipeline, Sample, ShownEstimator};
 use crate::plain;
@@ -123,7 +123,7 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let learned = learned(args, &loaded)?;
     let (commands, inbox) = channel();
     let mut output = Output::new(args, commands.clone(), learned)?;
-    output.stream_touches(args, &loaded)?;
+    output.stream_touches(args, &address, &loaded)?;
     let recorder = args.record.as_deref().map(Recorder::create).transpose();
     let recorder = recorder.map_err(anyhow::Error::msg)?;
     let pipeline = pipeline(args, &loaded, output.learned.as_ref())?;
@@ -294,7 +294,12 @@ impl Output {
     }
 
     /// Where touches go as messages.
-    fn stream_touches(&mut self, args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
+    fn stream_touches(
+        &mut self,
+        args: &ListenArgs,
+        address: &Address,
+        loaded: &LoadedProject,
+    ) -> anyhow::Result<()> {
         let provenance = Provenance {
             mesh_path: &loaded.mesh_path,
             version: env!("CARGO_PKG_VERSION"),
@@ -311,6 +316,12 @@ impl Output {
             .as_deref()
             .map(|path| McapLog::create(path, &link));
         self.log = log.transpose().map_err(anyhow::Error::msg)?;
+        if let Some(log) = &mut self.log
+            && address.is_recording()
+        {
+            let extent = RecordingExtent::of(Path::new(&args.port));
+            log.began(extent.map_err(anyhow::Error::msg)?.began_ns);
+        }
         if let Some(address) = self.foxglove.as_ref().and_then(FoxgloveServer::address) {
             say(&format!("Foxglove finds touches at ws://{address}"));
         }
@@ -335,6 +346,10 @@ impl Output {
                 if let Some(csv) = &mut self.csv {
                     csv.truth = *touch;
                 }
+            }
+            SessionEvent::Clock { .. } => {
+                let told = self.log.as_mut().map(|log| log.event(event));
+                told.transpose().map_err(anyhow::Error::msg)?;
             }
             SessionEvent::Sample { sample, update, .. } => {
                 self.row(sample, update)?;

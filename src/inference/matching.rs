@@ -77,6 +77,27 @@ impl Contact {
         }
     }
 
+    /// A finger at the origin that is felt clearly (N).
+    #[cfg(test)]
+    #[must_use]
+    pub fn of_finger(force: f64) -> Self {
+        Self {
+            position: DVec3::ZERO,
+            normal: DVec3::Z,
+            force,
+            drag: DVec3::ZERO,
+            drag_deviation: 0.0,
+            force_deviation: 0.1,
+            region: CredibleRegion {
+                axes: [DVec3::X, DVec3::Y],
+                radius: 1e-3,
+            },
+            strength: 100.0,
+            narrow: true,
+            unexplained: 1.0,
+        }
+    }
+
     /// The whole force on the part (N): what presses, and what acts along the surface.
     #[must_use]
     pub fn on_part(&self) -> DVec3 {

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
 
+use super::SessionEvent;
 use super::touch_messages::{MessagesAt, TOPICS, TouchMessages, topics};
 use crate::live::LiveUpdate;
 
@@ -66,6 +67,26 @@ impl McapLog {
             sequence: 0,
             touches: TouchMessages::new(link, false),
         })
+    }
+
+    /// Of a recording: when it began (ns since 1970), where nothing in it tells.
+    pub fn began(&mut self, began_ns: u64) {
+        self.touches.began(began_ns);
+    }
+
+    /// Writes what an event of a connection tells of touches.
+    ///
+    /// # Errors
+    /// Why it can be written no more.
+    pub fn event(&mut self, event: &SessionEvent) -> Result<(), String> {
+        match event {
+            SessionEvent::Clock { unix_us, time_us } => {
+                self.touches.clock(unix_us.saturating_mul(1000), *time_us);
+            }
+            SessionEvent::Sample { update, .. } => self.sample(update)?,
+            _ => {}
+        }
+        Ok(())
     }
 
     /// Writes what touches at a sample.

@@ -6,6 +6,8 @@ use std::net::SocketAddr;
 #[cfg(not(feature = "mcap"))]
 use std::path::Path;
 
+#[cfg(not(feature = "mcap"))]
+use super::SessionEvent;
 use crate::live::LiveUpdate;
 
 /// A build without the feature `mcap` writes none.
@@ -24,6 +26,16 @@ impl McapLog {
     /// Always.
     pub fn replace(path: &Path, link: &str) -> Result<Self, String> {
         Self::create(path, link)
+    }
+
+    pub fn began(&mut self, _: u64) {
+        match self.0 {}
+    }
+
+    /// # Errors
+    /// None: there is none of it.
+    pub fn event(&mut self, _: &SessionEvent) -> Result<(), String> {
+        match self.0 {}
     }
 
     /// # Errors

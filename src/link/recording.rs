@@ -17,6 +17,8 @@ use crate::wire::{Hello, WireMessage, encode};
 const FLUSH: Duration = Duration::from_millis(100);
 /// What notes began with when they were LOG frames of level 0.
 const OLD_NOTE: &str = "hapdef ";
+/// How far the board's clock may leave that of the machine before that is written again (µs).
+const APART_US: u64 = 500_000;
 /// Values of a line that surely fit into one frame.
 const VALUES: usize = 8;
 
@@ -30,6 +32,8 @@ pub struct Recorder {
     /// Channels and bits of a sample, once a board has said them; one that prints lines never does.
     layout: Option<(usize, u8)>,
     time_us: u64,
+    /// What this machine's clock said (µs since 1970) at a time of the board's (µs), as it was written last.
+    clock: Option<(u64, u64)>,
     pub samples: u64,
     pub bytes: u64,
     /// Why it ended by itself.
@@ -64,6 +68,7 @@ impl Recorder {
             sequence: 0,
             layout: None,
             time_us: 0,
+            clock: None,
             samples: 0,
             bytes: 0,
             failed: None,
@@ -108,6 +113,20 @@ impl Recorder {
         }
     }
 
+    /// When the sample at a time of the board's clock came (µs since 1970): it is written where the board's clock does not
+    /// tell it by itself.
+    pub fn clock(&mut self, time_us: u64, unix_us: u64) {
+        let known = |(unix, board): (u64, u64)| {
+            let by_board = time_us.checked_sub(board).map(|since| unix + since);
+            by_board.is_some_and(|told| told.abs_diff(unix_us) < APART_US)
+        };
+        if !self.clock.is_some_and(known) {
+            self.clock = Some((unix_us, time_us));
+            self.time_us = time_us;
+            self.own(&format!("clock {unix_us}"));
+        }
+    }
+
     /// Plain lines may hold anything, and more than a frame does.
     fn line(&mut self, counts: &[f64]) {
         let last = counts.len().saturating_sub(1) / VALUES;
@@ -119,7 +138,7 @@ impl Recorder {
         }
     }
 
-    /// What was done: “tare”, “rest …”, “truth …”.
+    /// What was done: “tare”, “rest …”, “truth …”, “clock …”.
     pub fn own(&mut self, text: &str) {
         self.put(&WireMessage::Note(text.to_owned()));
     }
@@ -194,6 +213,25 @@ mod tests {
         assert!(Recorder::create(&path).is_err_and(|e| e.contains("already")));
         let nowhere = folder.path().join("none").join("a.hapdrec");
         assert!(Recorder::create(&nowhere).is_err_and(|e| e.contains("cannot be begun")));
+    }
+
+    /// At the first sample, when the board's clock has left this machine's, and when it begins anew.
+    #[test]
+    fn the_clock_is_written_where_it_is_news() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut recorder = Recorder::create(&folder.path().join("a.hapdrec")).unwrap();
+        let mut written = Vec::new();
+        for (board, unix) in [
+            (7, 100),
+            (1_000_007, 1_000_100),
+            (2_000_007, 2_600_100),
+            (5, 9_000_000),
+        ] {
+            let before = recorder.bytes;
+            recorder.clock(board, unix);
+            written.push(recorder.bytes > before);
+        }
+        assert_eq!(written, [true, false, true, true]);
     }
 
     #[cfg(target_os = "linux")]

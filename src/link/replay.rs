@@ -1,7 +1,7 @@
 //! A recording as a port: its frames come as they came.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::port::{Got, Pace, Port};
 use crate::memory;
@@ -62,6 +62,34 @@ fn whole(path: &Path) -> Result<Vec<u8>, String> {
         ));
     }
     std::fs::read(path).map_err(unreadable)
+}
+
+/// What is known of a recording before it is replayed.
+pub struct RecordingExtent {
+    pub frames: usize,
+    /// When its first frame was written, where nothing in it tells: as long before it was last written to as it lasts
+    /// (nanoseconds since 1970).
+    pub began_ns: u64,
+}
+
+impl RecordingExtent {
+    /// Reads where the frames of a recording are.
+    ///
+    /// # Errors
+    /// That it cannot be read, is too large for memory, or is none.
+    pub fn of(path: &Path) -> Result<Self, String> {
+        let failed = |e: String| format!("{}: {e}", path.display());
+        let bytes = whole(path).map_err(failed)?;
+        let frames = frames(&bytes).map_err(failed)?;
+        let lasted = Duration::from_micros(frames.last().map_or(0, |f| f.1));
+        let written = std::fs::metadata(path).and_then(|about| about.modified());
+        let written = written.unwrap_or_else(|_| SystemTime::now());
+        let since = written.duration_since(UNIX_EPOCH).unwrap_or_default();
+        Ok(Self {
+            frames: frames.len(),
+            began_ns: since.saturating_sub(lasted).as_nanos() as u64,
+        })
+    }
 }
 
 /// Where frames end and when they are due; the last one takes what stands behind it.
@@ -182,6 +210,22 @@ mod tests {
         for pace in [Pace::Fast, Pace::Real] {
             assert_eq!(replayed(&all, pace).0, all);
         }
+    }
+
+    /// Two frames a tenth of a second apart, in a file that was written to at a known moment.
+    #[test]
+    fn a_recording_began_as_long_before_it_was_written_as_it_lasts() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hapdrec");
+        std::fs::write(&path, [note(5_000_000, 0), note(5_100_000, 1)].concat()).unwrap();
+        let written = UNIX_EPOCH + Duration::from_secs(1_700_000_000);
+        let file = std::fs::File::options().write(true).open(&path).unwrap();
+        file.set_modified(written).unwrap();
+        let extent = RecordingExtent::of(&path).unwrap();
+        assert_eq!(
+            (extent.frames, extent.began_ns),
+            (2, 1_699_999_999_900_000_000)
+        );
     }
 
     /// A clock that leaps by half an hour, or goes back, is not waited for.

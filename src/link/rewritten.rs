@@ -4,13 +4,19 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 
-use super::{Address, Listener, McapLog, Pace, SampleTable, SessionEvent};
+use super::{Address, Listener, McapLog, Pace, RecordingExtent, SampleTable, SessionEvent};
+use crate::budget::{Watch, report};
 use crate::live::Pipeline;
 
-/// Replays a recording as fast as it goes; what is done with an event may end it.
+/// Samples between two reports.
+const TOLD_EVERY: usize = 200;
+
+/// Replays a recording of so many frames as fast as it goes; what is done with an event may end it, and so may who watches.
 fn replay(
     recording: &Path,
+    frames: usize,
     pipeline: Pipeline,
+    watch: Watch,
     mut take: impl FnMut(&SessionEvent) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
     let address = Address::Recording {
@@ -20,10 +26,20 @@ fn replay(
     let (_commands, inbox) = channel();
     let stop = AtomicBool::new(false);
     let mut taken: anyhow::Result<()> = Ok(());
+    let mut samples = 0;
+    let mut go_on = |event: &SessionEvent| {
+        if let SessionEvent::Sample { .. } = event {
+            samples += 1;
+            if samples % TOLD_EVERY == 0 {
+                report(watch, "Replay", samples.min(frames), frames)?;
+            }
+        }
+        take(event)
+    };
     Listener::new(address, pipeline)
         .run(&stop, &inbox, |event| {
             if taken.is_ok() {
-                taken = take(&event);
+                taken = go_on(&event);
                 stop.store(taken.is_err(), Ordering::Relaxed);
             }
         })
@@ -32,42 +48,58 @@ fn replay(
 }
 
 /// Replays a recording into a table, in place of an older one; the files that it takes, more than one where the number of
-/// channels changes.
+/// channels changes. Until it is whole the older one stays.
 ///
 /// # Errors
-/// When the one cannot be read or the other not written.
+/// When the one cannot be read or the other not written; [`crate::budget::Cancelled`].
 pub fn write_table(
     recording: &Path,
     table: &Path,
     pipeline: Pipeline,
+    watch: Watch,
 ) -> anyhow::Result<Vec<PathBuf>> {
-    let mut rows = SampleTable::replace(table)?;
-    replay(recording, pipeline, |event| {
+    let extent = RecordingExtent::of(recording).map_err(anyhow::Error::msg)?;
+    let mut rows = SampleTable::replace(&table.with_extension("part.csv"))?;
+    let written = replay(recording, extent.frames, pipeline, watch, |event| {
         match event {
             SessionEvent::Truth(touch) => rows.truth = *touch,
             SessionEvent::Sample { sample, update, .. } => drop(rows.take(sample, update)?),
             _ => {}
         }
         Ok(())
-    })?;
-    rows.flush()?;
-    Ok(rows.paths)
+    });
+    match written {
+        Ok(()) => rows.name(table),
+        Err(why) => {
+            rows.discard();
+            Err(why)
+        }
+    }
 }
 
-/// Replays a recording into a file of messages.
+/// Replays a recording into a file of messages (MCAP), in place of an older one; `link` is the frame that places are in. Until
+/// it is whole the older one stays.
 ///
 /// # Errors
-/// When the one cannot be read or the other not written.
+/// When the one cannot be read or the other not written; [`crate::budget::Cancelled`].
 pub fn write_messages(
     recording: &Path,
-    mut log: McapLog,
+    (path, link): (&Path, &str),
     pipeline: Pipeline,
+    watch: Watch,
 ) -> anyhow::Result<()> {
-    replay(recording, pipeline, |event| {
-        if let SessionEvent::Sample { update, .. } = event {
-            log.sample(update).map_err(anyhow::Error::msg)?;
-        }
-        Ok(())
-    })?;
-    log.finish().map_err(anyhow::Error::msg)
+    let extent = RecordingExtent::of(recording).map_err(anyhow::Error::msg)?;
+    let begun = path.with_extension("mcap.part");
+    let mut log = McapLog::replace(&begun, link).map_err(anyhow::Error::msg)?;
+    log.began(extent.began_ns);
+    let written = replay(recording, extent.frames, pipeline, watch, |event| {
+        log.event(event).map_err(anyhow::Error::msg)
+    });
+    let written = written
+        .and_then(|()| log.finish().map_err(anyhow::Error::msg))
+        .and_then(|()| Ok(std::fs::rename(&begun, path)?));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&begun);
+    }
+    written
 }

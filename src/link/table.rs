@@ -109,6 +109,34 @@ impl SampleTable {
         flushed.with_context(|| self.unwritten())
     }
 
+    /// All is written: it gets its name, in place of an older one, and what it went on in the names beside that which are
+    /// free. The files.
+    pub(super) fn name(mut self, table: &Path) -> anyhow::Result<Vec<PathBuf>> {
+        self.flush()?;
+        let named = |path: &PathBuf, name: &Path| {
+            let failed = || format!("{}: the table cannot be written there", name.display());
+            std::fs::rename(path, name).with_context(failed)
+        };
+        let mut names = Vec::new();
+        for (k, path) in self.paths.iter().enumerate() {
+            let name = if k == 0 {
+                table.to_owned()
+            } else {
+                another(table)?.0
+            };
+            named(path, &name)?;
+            names.push(name);
+        }
+        Ok(names)
+    }
+
+    /// What was begun is not wanted.
+    pub(super) fn discard(self) {
+        for path in &self.paths {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+
     fn head(&mut self, channels: usize) -> std::io::Result<()> {
         write!(self.file, "t_us")?;
         for k in 0..channels {

@@ -27,6 +27,8 @@ pub struct TouchMessages {
     link: String,
     /// Whether samples come as they are read, so that their time is now.
     is_live: bool,
+    /// When the first was, where nothing else tells (nanoseconds since 1970).
+    began_ns: Option<u64>,
     /// Nanoseconds since 1970 at a time of the board's clock (µs).
     anchor: Option<(u64, u64)>,
     last_us: u64,
@@ -48,10 +50,24 @@ impl TouchMessages {
         Self {
             link: link.to_owned(),
             is_live,
+            began_ns: None,
             anchor: None,
             last_us: 0,
             last_ns: 0,
         }
+    }
+
+    /// Of a recording: when it began (ns since 1970), where nothing in it tells.
+    #[cfg(feature = "mcap")]
+    pub fn began(&mut self, began_ns: u64) {
+        self.began_ns = Some(began_ns);
+    }
+
+    /// What the machine's clock said at a time of the board's (ns since 1970, µs), as a recording tells.
+    #[cfg(feature = "mcap")]
+    pub fn clock(&mut self, unix_ns: u64, time_us: u64) {
+        self.anchor = Some((unix_ns, time_us));
+        self.last_us = time_us;
     }
 
     /// When a sample was read (ns since 1970), by what this machine's clock says as it comes.
@@ -84,7 +100,8 @@ impl TouchMessages {
 
     /// What touches at a sample.
     pub fn of(&mut self, update: &LiveUpdate) -> MessagesAt {
-        let at_ns = self.at(update.time_us, now_ns());
+        let now = self.began_ns.unwrap_or_else(now_ns);
+        let at_ns = self.at(update.time_us, now);
         let none = Vec::new();
         let touches = update.touches.as_ref().map_or(&none, |t| &t.contacts);
         let contacts: Vec<Value> = (1..)

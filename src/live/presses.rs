@@ -112,29 +112,12 @@ fn mean<'a>(rows: impl Iterator<Item = &'a (u64, Vec<f64>)> + Clone) -> Vec<f64>
 
 #[cfg(test)]
 pub(super) mod tests {
-    use glam::DVec3;
-
     use super::*;
-    use crate::inference::{Contact, CredibleRegion, SeveralTouches};
+    use crate::inference::{Contact, SeveralTouches};
 
     /// A newton that is felt somewhere.
     pub fn felt() -> SeveralTouches {
-        let contact = Contact {
-            position: DVec3::ZERO,
-            normal: DVec3::Z,
-            force: 1.0,
-            drag: DVec3::ZERO,
-            drag_deviation: 0.0,
-            force_deviation: 0.1,
-            region: CredibleRegion {
-                axes: [DVec3::X, DVec3::Y],
-                radius: 1e-3,
-            },
-            strength: 100.0,
-            narrow: true,
-            unexplained: 1.0,
-        };
-        SeveralTouches::one(contact, 1.0)
+        SeveralTouches::one(Contact::of_finger(1.0), 1.0)
     }
 
     fn update(k: u64, strain: f64) -> LiveUpdate {

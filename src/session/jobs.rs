@@ -50,6 +50,8 @@ pub enum Task {
     CheckKnown,
     Table,
     Messages,
+    /// Touches for others, at an address.
+    Serve,
     /// Of the test-bed: a plan, and going through it.
     PlanPresses,
     Press,
@@ -91,6 +93,7 @@ impl Task {
             Self::CheckKnown => "Check the known touches".into(),
             Self::Table => "Write the table".into(),
             Self::Messages => "Write the messages".into(),
+            Self::Serve => "Serve touches".into(),
             Self::PlanPresses => "Plan the presses".into(),
             Self::Press => "Press the limb".into(),
             Self::Learn => "Learn from the presses".into(),
@@ -100,13 +103,16 @@ impl Task {
         }
     }
 
-    /// Whether it writes a file, and is not ended on the way.
+    /// Whether it writes a file, that is there whatever has changed since.
     #[must_use]
     pub fn writes(self) -> bool {
-        matches!(
-            self,
-            Self::Export | Self::Picture | Self::Save | Self::Table | Self::Messages
-        )
+        self.is_not_ended() || matches!(self, Self::Table | Self::Messages)
+    }
+
+    /// Whether it is not ended on the way.
+    #[must_use]
+    pub fn is_not_ended(self) -> bool {
+        matches!(self, Self::Export | Self::Picture | Self::Save)
     }
 
     /// Whether it is a step towards the goal that is kept computed.
@@ -131,6 +137,7 @@ impl Task {
                 | Self::UnitLimb
                 | Self::Measure
                 | Self::Save
+                | Self::Serve
         )
     }
 }
@@ -256,7 +263,7 @@ impl<S: 'static> Jobs<S> {
 
     /// As they are for another session: what writes a file goes on, and what has ended stays to be read.
     pub(super) fn for_another_session(mut self) -> Self {
-        self.cancel(|_| true);
+        self.cancel(|task| !task.writes());
         Self {
             session: self.session + 1,
             failed: Vec::new(),
@@ -362,7 +369,7 @@ impl<S: 'static> Jobs<S> {
         let (gone, kept): (Vec<Running<S>>, Vec<Running<S>>) = self
             .running
             .drain(..)
-            .partition(|r| which(r) && !r.task.writes());
+            .partition(|r| which(r) && !r.task.is_not_ended());
         self.running = kept;
         for r in &gone {
             r.job.cancel();

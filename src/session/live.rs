@@ -32,7 +32,6 @@ use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{
     Address, BAUD, Connection, Doorway, ENDING, Listener, ListenerCommand, Pace, Truths, host,
-    write_table,
 };
 use crate::live::{Pipeline, ShownEstimator};
 use feed::FeedShared;
@@ -260,25 +259,6 @@ impl Session {
     /// Takes what is read now for rest.
     pub fn tare(&mut self) {
         self.live.send(ListenerCommand::Tare);
-    }
-
-    /// Replays a recording into a table beside it.
-    pub fn write_table(&mut self, recording: &Path) {
-        let Some(sensing) = self.sensing().map(Arc::clone) else {
-            return self.complain("The table is made by the model of the gauges: connect first");
-        };
-        let (model, settings) = self.gauge_model(&sensing);
-        let recording = recording.to_owned();
-        let work = move |_: &Reporter| {
-            let pipeline = Pipeline::new(model, settings);
-            let table = recording.with_extension("csv");
-            write_table(&recording, &table, pipeline).map_err(|e| Stop::Failed(format!("{e:#}")))
-        };
-        // A file that was written is there whatever has changed since.
-        self.jobs.start(Task::Table, (), work, |s, (), paths| {
-            let names: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
-            s.tell(format!("The table is in {}", names.join(" and ")));
-        });
     }
 
     /// Begins to record raw counts.

@@ -30,7 +30,7 @@ pub fn running_jobs(ask: &mut Ask<'_>, ui: &mut Ui) {
                 .desired_width((width - 180.0).max(60.0));
             ui.add(bar);
             let name = format!("Cancel: {}", r.name());
-            let button = ui.add_enabled(!r.task.writes(), egui::Button::new("Cancel"));
+            let button = ui.add_enabled(!r.task.is_not_ended(), egui::Button::new("Cancel"));
             let button = button.on_disabled_hover_text("A file is being written");
             if button.accessible_name(name).clicked() {
                 cancel = Some(r.task);

@@ -235,7 +235,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::inference::{Contact, CredibleRegion, SeveralTouches};
+    use crate::inference::{Contact, SeveralTouches};
     use crate::live::{LiveUpdate, Sample};
 
     /// A plate whose corners are to be pressed.
@@ -293,21 +293,7 @@ mod tests {
 
     /// A finger is on the limb.
     fn press(desk: &mut HandDesk<'_>) {
-        let contact = Contact {
-            position: DVec3::ZERO,
-            normal: DVec3::Z,
-            force: 5.0,
-            drag: DVec3::ZERO,
-            drag_deviation: 0.0,
-            force_deviation: 0.1,
-            region: CredibleRegion {
-                axes: [DVec3::X, DVec3::Y],
-                radius: 1e-3,
-            },
-            strength: 100.0,
-            narrow: true,
-            unexplained: 1.0,
-        };
+        let contact = Contact::of_finger(5.0);
         for k in 0..60 {
             let sample = Sample {
                 time_us: k * 10_000,

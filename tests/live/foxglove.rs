@@ -221,6 +221,7 @@ fn the_window_serves_touches_and_writes_a_recording_as_messages() {
         s.session.live.look(|feed| feed.tared) == Some(true)
     });
     w.session_mut().serve_touches("127.0.0.1:0");
+    w.wait("the server", 30, |s| s.session.live.served_at.is_some());
     let address = w.session().live.served_at.unwrap().to_string();
     let mut socket = viewer(&address, "foxglove.sdk.v1").unwrap();
     assert_eq!(said(&mut socket)["op"], "serverInfo");
@@ -258,5 +259,11 @@ fn the_window_serves_touches_and_writes_a_recording_as_messages() {
     w.wait("the messages", 60, |s| !s.session.busy() && path.is_file());
     let bytes = std::fs::read(&path).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap();
-    assert!(messages.map(Result::unwrap).count() > 500);
+    let times: Vec<u64> = messages.map(|m| m.unwrap().log_time).collect();
+    assert!(times.len() > 500);
+    // Their time is when they were recorded, and not when they were written here.
+    let recorded = std::fs::metadata(&recording).unwrap().modified().unwrap();
+    let recorded = recorded.duration_since(std::time::UNIX_EPOCH).unwrap();
+    let ago = recorded.as_secs_f64() - 1e-9 * times[times.len() - 1] as f64;
+    assert!(ago.abs() < 0.5, "{ago}");
 }

@@ -37,6 +37,11 @@ pub enum SessionEvent<'a> {
     },
     /// Where a simulated board is really touched (m, N).
     Truth(Option<(DVec3, f64)>),
+    /// What the clock of the machine that recorded said at a time of the board's (µs since 1970, µs).
+    Clock {
+        unix_us: u64,
+        time_us: u64,
+    },
     /// What the board says, or how a recording was; safe to show.
     Message(&'a str),
     /// Why nothing that comes can be used; each reason once.

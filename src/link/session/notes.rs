@@ -27,6 +27,11 @@ impl Listener {
                     self.pipeline.mark_dead(&[k]);
                 }
             }
+            ["clock", unix] => {
+                if let Ok(unix_us) = unix.parse() {
+                    tell(SessionEvent::Clock { unix_us, time_us });
+                }
+            }
             ["truth", "none"] => tell(SessionEvent::Truth(None)),
             ["truth", x, y, z, force] => {
                 if let [Some(x), Some(y), Some(z), Some(force)] = [x, y, z, force].map(number) {

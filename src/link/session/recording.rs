@@ -1,5 +1,7 @@
 //! What arrives, written down while it arrives.
 
+use std::time::{SystemTime, UNIX_EPOCH};
+
 use super::listener::{Listener, SessionEvent};
 use crate::link::Recorder;
 
@@ -35,6 +37,15 @@ impl Listener {
                 r.own(&format!("dead {k}"));
             }
         });
+    }
+
+    /// When a sample comes: what is replayed has a time of its own.
+    pub(super) fn record_clock(&mut self, time_us: u64) {
+        if !self.address.is_recording() {
+            let since = SystemTime::now().duration_since(UNIX_EPOCH);
+            let unix_us = since.map_or(0, |since| since.as_micros() as u64);
+            self.record(|r| r.clock(time_us, unix_us));
+        }
     }
 
     /// A recording that can be written no more has ended, and that is said.

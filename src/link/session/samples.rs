@@ -88,6 +88,7 @@ impl Listener {
             self.record(|r| r.truth(touch));
             tell(SessionEvent::Truth(touch));
         }
+        self.record_clock(sample.time_us);
         self.record(|r| r.sample(sample));
         tell(SessionEvent::Sample {
             sample,

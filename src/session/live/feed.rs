@@ -124,6 +124,8 @@ impl Feed {
                 self.truth = *touch;
                 false
             }
+            // When it was recorded is nothing that is seen.
+            SessionEvent::Clock { .. } => false,
             SessionEvent::Message(text) | SessionEvent::Unrecorded(text) => {
                 self.say(text);
                 true

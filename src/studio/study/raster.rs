@@ -236,6 +236,14 @@ mod tests {
         while shown(&mut raster, 0) != Some(key(0)) {
             assert!(Instant::now() < until);
         }
+        // One that cannot be drawn leaves it, and the next is drawn.
+        let (begun, begins) = std::sync::mpsc::channel();
+        let breaks = move |_: &mut PixelCanvas| {
+            begun.send(()).unwrap();
+            panic!("nothing can be drawn")
+        };
+        assert!(raster.of(key(7), &ctx, AT_ONCE + 1, breaks).is_some());
+        begins.recv().unwrap();
         assert!(raster.of(key(1), &ctx, AT_ONCE + 1, |_| ()).is_some());
         while shown(&mut raster, 1) != Some(key(1)) {
             assert!(Instant::now() < until);
