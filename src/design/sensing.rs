@@ -140,13 +140,16 @@ pub fn drawn_at(
     Ok(gauged.drawn_on(&around, watch)?)
 }
 
-/// Of a mesh the triangles nearest to some places (m), with all that share a corner with them: there it has the normals that
-/// it has as a whole.
+/// Of a mesh the triangles nearest to some places (m), with two rings of those around them. There it has the normals that it has as
+/// a whole, also on a neighbour that is as near.
 fn around(mesh: &Arc<TriMesh>, places: &[DVec3]) -> Arc<TriMesh> {
     let nearest = places.iter().map(|&place| mesh.index().nearest(place).0);
-    let corners = nearest.flat_map(|at| mesh.triangles()[at.triangle as usize]);
-    let of_corner = |corner: u32| &mesh.vertex_triangles()[corner as usize];
-    let kept: HashSet<u32> = corners.flat_map(of_corner).copied().collect();
+    let mut kept: HashSet<u32> = nearest.map(|at| at.triangle).collect();
+    for _ in 0..2 {
+        let corners = (kept.iter()).flat_map(|&t| mesh.triangles()[t as usize]);
+        let of_corner = |corner: u32| &mesh.vertex_triangles()[corner as usize];
+        kept = corners.flat_map(of_corner).copied().collect();
+    }
     let part = mesh.part_of(|t| kept.contains(&t));
     part.map_or_else(|| Arc::clone(mesh), |(part, _)| Arc::new(part))
 }

@@ -17,8 +17,10 @@ use crate::wire::{Hello, WireMessage, encode};
 const FLUSH: Duration = Duration::from_millis(100);
 /// What notes began with when they were LOG frames of level 0.
 const OLD_NOTE: &str = "hapdef ";
-/// How far the board's clock may leave that of the machine before that is written again (µs).
+/// How far the board's clock may leave that of the machine before that is written again (µs), and for how long samples may
+/// come later than they should by it: what waited somewhere on the way is soon made up for.
 const APART_US: u64 = 500_000;
+const LATE_US: u64 = 10_000_000;
 /// Values of a line that surely fit into one frame.
 const VALUES: usize = 8;
 
@@ -32,8 +34,7 @@ pub struct Recorder {
     /// Channels and bits of a sample, once a board has said them; one that prints lines never does.
     layout: Option<(usize, u8)>,
     time_us: u64,
-    /// What this machine's clock said (µs since 1970) at a time of the board's (µs), as it was written last.
-    clock: Option<(u64, u64)>,
+    clock: RecordedClock,
     pub samples: u64,
     pub bytes: u64,
     /// Why it ended by itself.
@@ -68,7 +69,7 @@ impl Recorder {
             sequence: 0,
             layout: None,
             time_us: 0,
-            clock: None,
+            clock: RecordedClock::default(),
             samples: 0,
             bytes: 0,
             failed: None,
@@ -116,15 +117,15 @@ impl Recorder {
     /// When the sample at a time of the board's clock came (µs since 1970): it is written where the board's clock does not
     /// tell it by itself.
     pub fn clock(&mut self, time_us: u64, unix_us: u64) {
-        let known = |(unix, board): (u64, u64)| {
-            let by_board = time_us.checked_sub(board).map(|since| unix + since);
-            by_board.is_some_and(|told| told.abs_diff(unix_us) < APART_US)
-        };
-        if !self.clock.is_some_and(known) {
-            self.clock = Some((unix_us, time_us));
-            self.time_us = time_us;
-            self.own(&format!("clock {unix_us}"));
+        if self.clock.is_news(time_us, unix_us) {
+            self.note_clock(time_us, unix_us);
         }
+    }
+
+    /// As [`Self::clock`], where a recording has told it.
+    pub fn note_clock(&mut self, time_us: u64, unix_us: u64) {
+        self.time_us = time_us;
+        self.own(&format!("clock {unix_us}"));
     }
 
     /// Plain lines may hold anything, and more than a frame does.
@@ -180,6 +181,39 @@ impl Recorder {
     }
 }
 
+/// What this machine's clock says at times of the board's, as far as it was written.
+#[derive(Default)]
+struct RecordedClock {
+    /// µs since 1970 at a time of the board's (µs).
+    written: Option<(u64, u64)>,
+    /// The time of the board's since which samples have come late.
+    late_us: Option<u64>,
+}
+
+impl RecordedClock {
+    /// Whether a sample came otherwise than is written.
+    fn is_news(&mut self, time_us: u64, unix_us: u64) -> bool {
+        let told = self.written.and_then(|(unix, board)| {
+            let since = time_us.checked_sub(board)?;
+            Some(unix + since)
+        });
+        let is_late = told.is_some_and(|told| unix_us > told + APART_US);
+        let late_us = *self.late_us.get_or_insert(time_us);
+        if !is_late {
+            self.late_us = None;
+        }
+        let lasts = is_late && time_us.saturating_sub(late_us) > LATE_US;
+        let is_news = lasts || told.is_none_or(|told| unix_us + APART_US < told);
+        if is_news {
+            *self = Self {
+                written: Some((unix_us, time_us)),
+                late_us: None,
+            };
+        }
+        is_news
+    }
+}
+
 impl Drop for Recorder {
     /// One that was begun and never written to leaves nothing that would be in the way of the next.
     fn drop(&mut self) {
@@ -215,23 +249,21 @@ mod tests {
         assert!(Recorder::create(&nowhere).is_err_and(|e| e.contains("cannot be begun")));
     }
 
-    /// At the first sample, when the board's clock has left this machine's, and when it begins anew.
+    /// At the first sample, when the board's clock has left this machine's for good, and when either is set anew.
     #[test]
     fn the_clock_is_written_where_it_is_news() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut recorder = Recorder::create(&folder.path().join("a.hapdrec")).unwrap();
-        let mut written = Vec::new();
-        for (board, unix) in [
-            (7, 100),
-            (1_000_007, 1_000_100),
-            (2_000_007, 2_600_100),
-            (5, 9_000_000),
-        ] {
-            let before = recorder.bytes;
-            recorder.clock(board, unix);
-            written.push(recorder.bytes > before);
-        }
-        assert_eq!(written, [true, false, true, true]);
+        const S: u64 = 1_000_000;
+        let mut clock = RecordedClock::default();
+        let mut is_news = |board: u64, unix: u64| clock.is_news(board, unix);
+        assert!(is_news(S, 100 * S) && !is_news(2 * S, 101 * S));
+        // What waited for three seconds comes at once.
+        assert!(!is_news(3 * S, 105 * S) && !is_news(4 * S, 105 * S) && !is_news(6 * S, 105 * S));
+        // Late from here on.
+        let late: Vec<bool> = (7..=20).map(|k| is_news(k * S, (k + 102) * S)).collect();
+        assert_eq!(late.iter().position(|news| *news), Some(11), "{late:?}");
+        // This machine's clock is set back; the board begins anew.
+        assert!(is_news(21 * S, 50 * S) && is_news(5, 51 * S));
+        assert!(!is_news(S, 52 * S));
     }
 
     #[cfg(target_os = "linux")]

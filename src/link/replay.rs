@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use super::port::{Got, Pace, Port};
 use crate::memory;
 use crate::plain;
-use crate::wire::{Decoded, Decoder};
+use crate::wire::{Decoded, Decoder, WireMessage};
 
 /// The longest that is waited for between two frames (µs): no board is slower than one sample a second, and a
 /// clock that leapt would be waited for in vain.
@@ -66,30 +66,57 @@ fn whole(path: &Path) -> Result<Vec<u8>, String> {
 
 /// What is known of a recording before it is replayed.
 pub struct RecordingExtent {
-    pub frames: usize,
-    /// When its first frame was written, where nothing in it tells: as long before it was last written to as it lasts
-    /// (nanoseconds since 1970).
+    pub samples: usize,
+    /// When its first sample came, where nothing in it tells: as long before it was last written to as it lasts (nanoseconds
+    /// since 1970).
     pub began_ns: u64,
 }
 
 impl RecordingExtent {
-    /// Reads where the frames of a recording are.
+    /// Reads how many samples a recording has.
     ///
     /// # Errors
-    /// That it cannot be read, is too large for memory, or is none.
+    /// That it cannot be read, or is too large for memory.
     pub fn of(path: &Path) -> Result<Self, String> {
-        let failed = |e: String| format!("{}: {e}", path.display());
-        let bytes = whole(path).map_err(failed)?;
-        let frames = frames(&bytes).map_err(failed)?;
-        let lasted = Duration::from_micros(frames.last().map_or(0, |f| f.1));
+        let bytes = whole(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let (samples, lasted) = samples(&bytes);
         let written = std::fs::metadata(path).and_then(|about| about.modified());
         let written = written.unwrap_or_else(|_| SystemTime::now());
         let since = written.duration_since(UNIX_EPOCH).unwrap_or_default();
         Ok(Self {
-            frames: frames.len(),
+            samples,
             began_ns: since.saturating_sub(lasted).as_nanos() as u64,
         })
     }
+}
+
+/// How many samples there are, and how long they last.
+fn samples(bytes: &[u8]) -> (usize, Duration) {
+    let mut decoder = Decoder::default();
+    let (mut count, mut lasted, mut last) = (0, 0_u64, None::<u32>);
+    decoder.push(bytes, |event| {
+        if let Decoded::Message {
+            time_us, message, ..
+        } = event
+        {
+            let is_sample = match &message {
+                WireMessage::Data(_) => true,
+                WireMessage::Note(text) => text.starts_with("line "),
+                _ => false,
+            };
+            if is_sample {
+                let since = time_us.wrapping_sub(last.replace(time_us).unwrap_or(time_us));
+                // A clock that went back began anew.
+                lasted += if since < u32::MAX / 2 {
+                    u64::from(since)
+                } else {
+                    0
+                };
+                count += 1;
+            }
+        }
+    });
+    (count, Duration::from_micros(lasted))
 }
 
 /// Where frames end and when they are due; the last one takes what stands behind it.
@@ -160,7 +187,7 @@ impl Port for Replay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{WireMessage, encode};
+    use crate::wire::encode;
 
     fn note(time_us: u32, sequence: u16) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -212,20 +239,42 @@ mod tests {
         }
     }
 
-    /// Two frames a tenth of a second apart, in a file that was written to at a known moment.
+    /// Two samples that are a tenth of a second and ten minutes apart, behind what has no time, in a file that was written to at a known
+    /// moment.
     #[test]
     fn a_recording_began_as_long_before_it_was_written_as_it_lasts() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.hapdrec");
-        std::fs::write(&path, [note(5_000_000, 0), note(5_100_000, 1)].concat()).unwrap();
+        let framed = |message: WireMessage, sequence: u16, time_us: u32| {
+            let mut bytes = Vec::new();
+            encode(&message, sequence, time_us, 12, &mut bytes);
+            bytes
+        };
+        // Counts are read as the board has said that it sends them.
+        let hello = WireMessage::Hello(crate::wire::Hello {
+            version: crate::wire::VERSION,
+            board: 1,
+            channels: 2,
+            bits: 12,
+            reference_mv: 3300,
+            supply_mv: 3300,
+            gain_milli: 100_000,
+            rate_hz: 1000,
+            name: "Board".into(),
+        });
+        let all = [
+            framed(hello, 0, 0),
+            framed(WireMessage::Data(vec![7; 2]), 1, 5_000_000),
+            framed(WireMessage::Data(vec![7; 2]), 2, 5_100_000),
+            framed(WireMessage::Note("line 0 1.5,2.5".into()), 3, 605_100_000),
+        ];
+        std::fs::write(&path, all.concat()).unwrap();
         let written = UNIX_EPOCH + Duration::from_secs(1_700_000_000);
         let file = std::fs::File::options().write(true).open(&path).unwrap();
         file.set_modified(written).unwrap();
         let extent = RecordingExtent::of(&path).unwrap();
-        assert_eq!(
-            (extent.frames, extent.began_ns),
-            (2, 1_699_999_999_900_000_000)
-        );
+        assert_eq!(extent.samples, 3);
+        assert_eq!(extent.began_ns, 1_699_999_399_900_000_000);
     }
 
     /// A clock that leaps by half an hour, or goes back, is not waited for.

@@ -1,8 +1,10 @@
 //! A recording as other files: what its counts mean is computed anew.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
+
+use anyhow::Context as _;
 
 use super::{Address, Listener, McapLog, Pace, RecordingExtent, SampleTable, SessionEvent};
 use crate::budget::{Watch, report};
@@ -11,10 +13,10 @@ use crate::live::Pipeline;
 /// Samples between two reports.
 const TOLD_EVERY: usize = 200;
 
-/// Replays a recording of so many frames as fast as it goes; what is done with an event may end it, and so may who watches.
+/// Replays a recording of so many samples as fast as it goes; what is done with an event may end it, and so may who watches.
 fn replay(
     recording: &Path,
-    frames: usize,
+    all: usize,
     pipeline: Pipeline,
     watch: Watch,
     mut take: impl FnMut(&SessionEvent) -> anyhow::Result<()>,
@@ -31,7 +33,7 @@ fn replay(
         if let SessionEvent::Sample { .. } = event {
             samples += 1;
             if samples % TOLD_EVERY == 0 {
-                report(watch, "Replay", samples.min(frames), frames)?;
+                report(watch, "Replay", samples.min(all), all)?;
             }
         }
         take(event)
@@ -44,7 +46,24 @@ fn replay(
             }
         })
         .map_err(anyhow::Error::msg)?;
-    taken
+    taken?;
+    // Nothing is replaced by what somebody has cancelled.
+    Ok(report(watch, "Replay", all, all)?)
+}
+
+/// A file beside another, for what is not whole yet: nobody else writes one of this name.
+fn aside(path: &Path) -> PathBuf {
+    static BEGUN: AtomicUsize = AtomicUsize::new(0);
+    let number = BEGUN.fetch_add(1, Ordering::Relaxed);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.{}-{number}.part", std::process::id()))
+}
+
+fn unwritten(path: &Path) -> String {
+    format!(
+        "{}: it was not written, and what may have been there stays",
+        path.display()
+    )
 }
 
 /// Replays a recording into a table, in place of an older one; the files that it takes, more than one where the number of
@@ -59,8 +78,8 @@ pub fn write_table(
     watch: Watch,
 ) -> anyhow::Result<Vec<PathBuf>> {
     let extent = RecordingExtent::of(recording).map_err(anyhow::Error::msg)?;
-    let mut rows = SampleTable::replace(&table.with_extension("part.csv"))?;
-    let written = replay(recording, extent.frames, pipeline, watch, |event| {
+    let mut rows = SampleTable::replace(&aside(table)).with_context(|| unwritten(table))?;
+    let written = replay(recording, extent.samples, pipeline, watch, |event| {
         match event {
             SessionEvent::Truth(touch) => rows.truth = *touch,
             SessionEvent::Sample { sample, update, .. } => drop(rows.take(sample, update)?),
@@ -68,13 +87,11 @@ pub fn write_table(
         }
         Ok(())
     });
-    match written {
-        Ok(()) => rows.name(table),
-        Err(why) => {
-            rows.discard();
-            Err(why)
-        }
+    let named = written.and_then(|()| rows.name(table));
+    if named.is_err() {
+        rows.discard();
     }
+    named.with_context(|| unwritten(table))
 }
 
 /// Replays a recording into a file of messages (MCAP), in place of an older one; `link` is the frame that places are in. Until
@@ -89,10 +106,11 @@ pub fn write_messages(
     watch: Watch,
 ) -> anyhow::Result<()> {
     let extent = RecordingExtent::of(recording).map_err(anyhow::Error::msg)?;
-    let begun = path.with_extension("mcap.part");
-    let mut log = McapLog::replace(&begun, link).map_err(anyhow::Error::msg)?;
+    let begun = aside(path);
+    let log = McapLog::replace(&begun, link).map_err(anyhow::Error::msg);
+    let mut log = log.with_context(|| unwritten(path))?;
     log.began(extent.began_ns);
-    let written = replay(recording, extent.frames, pipeline, watch, |event| {
+    let written = replay(recording, extent.samples, pipeline, watch, |event| {
         log.event(event).map_err(anyhow::Error::msg)
     });
     let written = written
@@ -101,5 +119,5 @@ pub fn write_messages(
     if written.is_err() {
         let _ = std::fs::remove_file(&begun);
     }
-    written
+    written.with_context(|| unwritten(path))
 }

@@ -116,7 +116,8 @@ impl Listener {
                 Got::Nothing => {}
                 Got::Bytes(count) => {
                     let arrived = Instant::now();
-                    let since = port.came().saturating_duration_since(self.begun);
+                    self.came = port.came();
+                    let since = self.came.saturating_duration_since(self.begun);
                     let now_us = since.as_micros() as u64;
                     self.receiver
                         .push(&buffer[..count], now_us, |input| inputs.push(input));

@@ -109,28 +109,29 @@ impl SampleTable {
         flushed.with_context(|| self.unwritten())
     }
 
-    /// All is written: it gets its name, in place of an older one, and what it went on in the names beside that which are
-    /// free. The files.
-    pub(super) fn name(mut self, table: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    /// All is written: what it went on in gets the names beside the table's that are free, and then the table its own, in
+    /// place of an older one. The files; where one cannot be named, none is.
+    pub(super) fn name(&mut self, table: &Path) -> anyhow::Result<Vec<PathBuf>> {
         self.flush()?;
-        let named = |path: &PathBuf, name: &Path| {
-            let failed = || format!("{}: the table cannot be written there", name.display());
-            std::fs::rename(path, name).with_context(failed)
-        };
-        let mut names = Vec::new();
-        for (k, path) in self.paths.iter().enumerate() {
-            let name = if k == 0 {
-                table.to_owned()
-            } else {
-                another(table)?.0
-            };
-            named(path, &name)?;
-            names.push(name);
+        let mut names = vec![table.to_owned()];
+        let named = self.name_each(table, &mut names);
+        if named.is_err() {
+            for name in &names[1..] {
+                let _ = std::fs::remove_file(name);
+            }
         }
-        Ok(names)
+        named.map(|()| names)
     }
 
-    /// What was begun is not wanted.
+    fn name_each(&self, table: &Path, names: &mut Vec<PathBuf>) -> anyhow::Result<()> {
+        for path in &self.paths[1..] {
+            names.push(another(table)?.0);
+            std::fs::rename(path, &names[names.len() - 1])?;
+        }
+        Ok(std::fs::rename(&self.paths[0], table)?)
+    }
+
+    /// What was begun, and has no name yet, is not wanted.
     pub(super) fn discard(self) {
         for path in &self.paths {
             let _ = std::fs::remove_file(path);

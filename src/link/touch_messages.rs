@@ -66,7 +66,8 @@ impl TouchMessages {
     /// What the machine's clock said at a time of the board's (ns since 1970, µs), as a recording tells.
     #[cfg(feature = "mcap")]
     pub fn clock(&mut self, unix_ns: u64, time_us: u64) {
-        self.anchor = Some((unix_ns, time_us));
+        // A clock that was set back does not hold those up that follow.
+        self.anchor = Some((unix_ns.max(self.last_ns), time_us));
         self.last_us = time_us;
     }
 

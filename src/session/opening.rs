@@ -184,6 +184,7 @@ impl Session {
         }
         let was_live = self.live.is_connected();
         let was_served = self.live.served_at;
+        let would_serve = self.jobs.runs(Task::Serve);
         self.replace(opened.document, opened.shape);
         self.news.leave();
         for said in opened.said {
@@ -191,6 +192,11 @@ impl Session {
         }
         if was_live {
             self.tell("The board was hung up: its readings were taken for the part that was open before. Connect again");
+        }
+        if would_serve {
+            self.tell(
+                "Touches are not served: they would have been of the part that was open before",
+            );
         }
         if let Some(address) = was_served {
             self.tell(format!("Touches are not served at ws://{address} any more: they were of the part that was open before"));

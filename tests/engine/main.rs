@@ -46,6 +46,7 @@ mod refine;
 mod regions;
 mod remesh;
 mod rest;
+mod rewritten;
 mod same_part;
 mod session_core;
 mod several;

@@ -83,6 +83,8 @@ pub struct Listener {
     pub(super) device: Option<String>,
     pub(super) rate: Option<u16>,
     pub(super) state: ConnectionState,
+    /// When what is taken in just now came.
+    pub(super) came: Instant,
     /// When the last sample came, or the port was opened.
     pub(super) last_arrival: Instant,
     /// Why nothing can be used, as far as it was told.
@@ -114,6 +116,7 @@ impl Listener {
             device: None,
             rate: None,
             state: ConnectionState::Waiting,
+            came: Instant::now(),
             last_arrival: Instant::now(),
             explained: Vec::new(),
             compared: None,

@@ -29,6 +29,7 @@ impl Listener {
             }
             ["clock", unix] => {
                 if let Ok(unix_us) = unix.parse() {
+                    self.record(|r| r.note_clock(time_us, unix_us));
                     tell(SessionEvent::Clock { unix_us, time_us });
                 }
             }

@@ -39,10 +39,11 @@ impl Listener {
         });
     }
 
-    /// When a sample comes: what is replayed has a time of its own.
+    /// When a sample came: what is replayed has a time of its own.
     pub(super) fn record_clock(&mut self, time_us: u64) {
         if !self.address.is_recording() {
-            let since = SystemTime::now().duration_since(UNIX_EPOCH);
+            let came = SystemTime::now().checked_sub(self.came.elapsed());
+            let since = came.unwrap_or(UNIX_EPOCH).duration_since(UNIX_EPOCH);
             let unix_us = since.map_or(0, |since| since.as_micros() as u64);
             self.record(|r| r.clock(time_us, unix_us));
         }

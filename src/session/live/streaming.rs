@@ -63,7 +63,7 @@ impl Session {
             let path = recording.with_extension("mcap");
             let to = (path.as_path(), &link[..]);
             let written = write_messages(&recording, to, pipeline, &|p| reporter.report(p));
-            written.map_err(|e| rewriting_ended(&path, &e))?;
+            written.map_err(|e| rewriting_ended(&e))?;
             Ok(path)
         };
         // A file that was written is there whatever has changed since.
@@ -83,7 +83,7 @@ impl Session {
             let pipeline = Pipeline::new(model, settings);
             let table = recording.with_extension("csv");
             let written = write_table(&recording, &table, pipeline, &|p| reporter.report(p));
-            written.map_err(|e| rewriting_ended(&table, &e))
+            written.map_err(|e| rewriting_ended(&e))
         };
         // A file that was written is there whatever has changed since.
         self.jobs.start(Task::Table, (), work, |s, (), paths| {
@@ -103,10 +103,10 @@ impl Session {
 }
 
 /// Why a recording was not written as another file.
-fn rewriting_ended(path: &Path, error: &anyhow::Error) -> Stop {
+fn rewriting_ended(error: &anyhow::Error) -> Stop {
     if error.is::<Cancelled>() {
         Stop::Cancelled
     } else {
-        Stop::Failed(format!("{}: {error:#}", path.display()))
+        Stop::Failed(format!("{error:#}"))
     }
 }

@@ -239,7 +239,8 @@ fn recording_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
         let last = ask.session.live.recorded.clone().filter(|_| recording.is_none());
         let table = egui::Button::new("Write a table");
         let help = "The last recording as .csv beside it: counts, touches, and the truth of a simulated board";
-        if ui.add_enabled(last.is_some(), table).on_hover_text(help).clicked()
+        let free = last.is_some() && !ask.session.jobs.runs(Task::Table);
+        if ui.add_enabled(free, table).on_hover_text(help).clicked()
             && let Some(path) = last
         {
             ask.act(FileAction::WriteTable(path));
@@ -266,10 +267,13 @@ fn messages_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
             let field = TextEdit::singleline(&mut form.serve_at)
                 .desired_width(105.0)
                 .hint_text(USUAL_ADDRESS);
-            ui.add_enabled(served.is_none(), field).labelled_by(name.id);
-            let (label, action) = match served {
-                None => ("Serve", BoardAction::Serve(form.serve_at.clone())),
-                Some(_) => ("Stop serving", BoardAction::StopServing),
+            // The name of a host may take a while to be looked up.
+            let serves = served.is_some() || ask.session.jobs.runs(Task::Serve);
+            ui.add_enabled(!serves, field).labelled_by(name.id);
+            let (label, action) = if serves {
+                ("Stop serving", BoardAction::StopServing)
+            } else {
+                ("Serve", BoardAction::Serve(form.serve_at.clone()))
             };
             let help =
                 "Touches as they come, to Foxglove and others that speak its WebSocket protocol";
