@@ -240,8 +240,7 @@ fn a_block_without_walls_keeps_its_faces() {
 #[test]
 fn the_papers_limb_is_touched_on_its_shell_and_glued_to_behind_it() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/paper-limb/ds.dat");
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
+    if crate::is_missing(&path) {
         return;
     }
     let inputs = cli::open(&path, None).unwrap().inputs;

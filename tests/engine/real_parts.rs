@@ -19,8 +19,7 @@ fn real_limbs_become_datasets() {
         "poppy_humanoid_l_thigh_visual.STL",
     ] {
         let path = folder.join(name);
-        if !path.is_file() {
-            println!("{name}: absent, not tried");
+        if crate::is_missing(&path) {
             continue;
         }
         let loaded = read_mesh(&path, Some(Unit::Metre), 0, Repair::default()).unwrap();

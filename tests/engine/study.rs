@@ -672,8 +672,7 @@ fn the_size_of_the_part_changes_nothing_but_the_size_of_the_errors() {
 fn a_measured_skin_is_judged_by_its_places() {
     let skin = "../shared/measured/eflesh_1.npz";
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(skin);
-    if !path.is_file() {
-        println!("skipped: {} is not there", path.display());
+    if crate::is_missing(&path) {
         return;
     }
     let judge = |split: &str| {
