@@ -13,6 +13,7 @@ use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
 use hapdef::dataset::{self, Signal, SignalMatrix};
 use hapdef::design::{self, Inputs};
+use hapdef::elasticity::estimate::AccuracyTarget;
 use hapdef::elasticity::{ShellModel, Touch};
 use hapdef::mesh::sample;
 use hapdef::uncertainty::Making;
@@ -260,12 +261,16 @@ fn trade(text: &mut String) {
         })
     };
     let truth = ground
-        .grade(&touches, &places, &aim(TRUTH, 3), &unwatched)
+        .grade(
+            &AccuracyTarget::new(&touches, &places, &aim(TRUTH, 3)),
+            &unwatched,
+        )
         .expect("grades");
     let truth = read(&truth.model, &touches);
     for vertices in SIZES {
-        let (graded, build) =
-            on_one_core(|| ground.grade(&touches, &places, &aim(vertices, 2), &unwatched));
+        let aim = aim(vertices, 2);
+        let target = AccuracyTarget::new(&touches, &places, &aim);
+        let (graded, build) = on_one_core(|| ground.grade(&target, &unwatched));
         let model = graded.expect("grades").model;
         let points: Vec<_> = places
             .iter()

@@ -253,9 +253,10 @@ impl SimulatedBoard {
             tell(Truth::of(time_us, &pushes));
             self.next_us += SECOND_US / u64::from(self.rate_hz);
             if time_us / STATUS_EVERY != self.next_us / STATUS_EVERY {
+                let celsius = self.disturbed.temperature(units::seconds(time_us));
                 let status = WireMessage::Status {
                     overruns: self.overruns,
-                    temperature_centi: Some(2300),
+                    temperature_centi: Some((100.0 * celsius).round() as i16),
                 };
                 self.send(&status, time_us, out);
             }

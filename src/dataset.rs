@@ -22,7 +22,7 @@ use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::uncertainty::Making;
 use crate::units;
 
-use site::{StrainMoments, gauges_on};
+use site::{SlopesAsked, StrainMoments, gauges_on};
 use std::f64::consts::PI;
 
 pub use columns::Columns;
@@ -390,12 +390,17 @@ pub fn simulate(
     if signal == Signal::Strain && !slope_touches.is_empty() {
         let turned = by_angle.into_iter().flatten().collect();
         let gauges: Vec<Gauge> = sites.iter().map(|s| s.gauge).collect();
-        let (found, solves) =
-            GluingSlopes::of(model, &gauges, &touches, slope_touches, turned, watch)?;
+        let asked = SlopesAsked {
+            model,
+            gauges: &gauges,
+            touches: &touches,
+            columns: slope_touches,
+            watch,
+        };
+        let (found, solves) = GluingSlopes::of(&asked, turned)?;
         work.solves += solves as u64;
         slopes = Some(found);
-        let (found, solves) =
-            MakingSlopes::of(model, &gauges, &touches, slope_touches, making, watch)?;
+        let (found, solves) = MakingSlopes::of(&asked, making)?;
         work.solves += solves as u64;
         otherwise = Some(found);
     }

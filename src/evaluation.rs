@@ -119,17 +119,22 @@ pub fn evaluate(
     budget: &Budget,
     watch: Watch,
 ) -> Result<Evaluation, Cancelled> {
-    let noisy = Noisy::new(trial);
+    let judge = Judge {
+        noisy: Noisy::new(trial),
+        trial,
+        budget,
+        watch,
+    };
     let mut evaluation = Evaluation::default();
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let hypers = tune_sets(&noisy, trial, sets, budget, watch, &mut evaluation.work)?;
+    let hypers = judge.tune_sets(sets, &mut evaluation.work)?;
     let results: Result<Vec<_>, Cancelled> = sets
         .par_iter()
         .zip(&hypers)
         .map(|(set, hyper)| {
             let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             report(watch, "Evaluating", so_far, sets.len())?;
-            Ok(judge(&noisy, trial, set, hyper, budget))
+            Ok(judge.learn(set, hyper))
         })
         .collect();
     for (set, work) in results? {
@@ -137,50 +142,8 @@ pub fn evaluate(
         evaluation.sets.push(set);
         evaluation.work += work;
     }
-    evaluation.failures = fail(&noisy, trial, sets, &hypers, budget, watch)?;
+    evaluation.failures = judge.fail(sets, &hypers)?;
     Ok(evaluation)
-}
-
-/// Failures of each selector's last set; the baseline of all candidates is none.
-fn fail(
-    noisy: &Noisy,
-    trial: &EvaluationTrial,
-    sets: &[Candidate],
-    hypers: &[Hyper],
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Vec<Failures>, Cancelled> {
-    if budget.failure_subsets == 0 {
-        return Ok(Vec::new());
-    }
-    let touches = evenly(trial.train_targets.len(), budget.failure_touches);
-    let targets: Vec<[f64; 3]> = touches.iter().map(|&t| trial.train_targets[t]).collect();
-    let train = noisy.train.select_columns(&touches);
-    (0..sets.len())
-        .filter(|&k| is_largest(sets, k) && sets[k].rows.len() > 1)
-        .map(|k| {
-            let set = &sets[k];
-            let rows = failures(
-                &FailureTrial {
-                    train: &train.select_rows(&set.rows),
-                    train_targets: &targets,
-                    test: &noisy.test.select_rows(&set.rows),
-                    test_targets: trial.test_targets,
-                    hyper: hypers[k],
-                    effort: tuning_effort(budget, trial),
-                    failed: MOST_FAILED,
-                    subsets: budget.failure_subsets,
-                    seed: trial.seed,
-                },
-                watch,
-            )?;
-            Ok(Failures {
-                set: set.id(),
-                touches: touches.len(),
-                rows,
-            })
-        })
-        .collect()
 }
 
 /// Whether a set is the last of its selector's, and so its largest; the baseline of all candidates is nobody's.
@@ -244,55 +207,6 @@ pub(crate) fn add_noise_by<'a>(
     Cow::Owned(SignalMatrix::new(x.columns(), values))
 }
 
-fn tune_sets(
-    noisy: &Noisy,
-    trial: &EvaluationTrial,
-    sets: &[Candidate],
-    budget: &Budget,
-    watch: Watch,
-    work: &mut Work,
-) -> Result<Vec<Hyper>, Cancelled> {
-    let validation = CrossValidation {
-        folds: budget.folds.min(3),
-        seed: trial.seed,
-        // Computed touches lie apart.
-        grouping: Grouping::Touch,
-        effort: tuning_effort(budget, trial),
-    };
-    let grid = TuningGrid::default().scaled(scale::decade(trial.train_targets));
-    let columns = evenly(trial.train_targets.len(), budget.tuning_touches);
-    let targets: Vec<[f64; 3]> = columns.iter().map(|&c| trial.train_targets[c]).collect();
-    let mut hypers: Vec<Hyper> = Vec::with_capacity(sets.len());
-    let mut known: Vec<(SetId, Hyper)> = Vec::new();
-    for set in sets {
-        let size = set.rows.len();
-        let tuned = TUNED_SIZES
-            .iter()
-            .copied()
-            .filter(|&t| t <= size)
-            .max()
-            .unwrap_or(size);
-        let (own, smaller) = (set.id(), set.chooser.set(tuned));
-        let reuse = (known.iter()).find(|(of, _)| *of == smaller && own != smaller);
-        let hyper = if let Some(hyper) = set.hyper {
-            hyper
-        } else if let Some((_, hyper)) = reuse {
-            Hyper {
-                gamma: hyper.gamma * tuned as f64 / size as f64,
-                ..*hyper
-            }
-        } else {
-            let x = noisy.train.select_rows(&set.rows).select_columns(&columns);
-            let (search, cost) = tune::search(&x, &targets, &grid, &validation, watch)?;
-            *work += cost;
-            known.push((own, search.best()));
-            search.best()
-        };
-        hypers.push(hyper);
-    }
-    Ok(hypers)
-}
-
 /// A search needs the order of the settings, not their last digit.
 fn tuning_effort(budget: &Budget, trial: &EvaluationTrial) -> Effort {
     let effort = Effort {
@@ -302,30 +216,116 @@ fn tuning_effort(budget: &Budget, trial: &EvaluationTrial) -> Effort {
     effort.scaled(scale::decade(trial.train_targets))
 }
 
-fn judge(
-    noisy: &Noisy,
-    trial: &EvaluationTrial,
-    set: &Candidate,
-    hyper: &Hyper,
-    budget: &Budget,
-) -> (JudgedSet, Work) {
-    let effort = Effort {
-        tolerance: budget.svr_tolerance_mm,
-        max_steps: budget.svr_steps,
-    };
-    let effort = effort.scaled(scale::decade(trial.train_targets));
-    let train = noisy.train.select_rows(&set.rows);
-    let model = PositionModel::train(&train, trial.train_targets, hyper, effort);
-    let predicted = model.predict(&noisy.test.select_rows(&set.rows));
-    let built = model.predict(&noisy.workshop.select_rows(&set.rows));
-    let judged = JudgedSet {
-        set: set.id(),
-        hyper: Some(*hyper),
-        converged: Some(model.converged().0),
-        drawn: distances(&predicted, trial.test_targets),
-        built: distances(&built, trial.test_targets),
-    };
-    (judged, model.work)
+/// What sets are judged by.
+struct Judge<'a> {
+    noisy: Noisy<'a>,
+    trial: &'a EvaluationTrial<'a>,
+    budget: &'a Budget,
+    watch: Watch<'a>,
+}
+
+impl Judge<'_> {
+    /// The settings of each set's regression.
+    fn tune_sets(&self, sets: &[Candidate], work: &mut Work) -> Result<Vec<Hyper>, Cancelled> {
+        let (noisy, trial, budget) = (&self.noisy, self.trial, self.budget);
+        let validation = CrossValidation {
+            folds: budget.folds.min(3),
+            seed: trial.seed,
+            // Computed touches lie apart.
+            grouping: Grouping::Touch,
+            effort: tuning_effort(budget, trial),
+        };
+        let grid = TuningGrid::default().scaled(scale::decade(trial.train_targets));
+        let columns = evenly(trial.train_targets.len(), budget.tuning_touches);
+        let targets: Vec<[f64; 3]> = columns.iter().map(|&c| trial.train_targets[c]).collect();
+        let mut hypers: Vec<Hyper> = Vec::with_capacity(sets.len());
+        let mut known: Vec<(SetId, Hyper)> = Vec::new();
+        for set in sets {
+            let size = set.rows.len();
+            let tuned = TUNED_SIZES
+                .iter()
+                .copied()
+                .filter(|&t| t <= size)
+                .max()
+                .unwrap_or(size);
+            let (own, smaller) = (set.id(), set.chooser.set(tuned));
+            let reuse = (known.iter()).find(|(of, _)| *of == smaller && own != smaller);
+            let hyper = if let Some(hyper) = set.hyper {
+                hyper
+            } else if let Some((_, hyper)) = reuse {
+                Hyper {
+                    gamma: hyper.gamma * tuned as f64 / size as f64,
+                    ..*hyper
+                }
+            } else {
+                let x = noisy.train.select_rows(&set.rows).select_columns(&columns);
+                let (search, cost) = tune::search(&x, &targets, &grid, &validation, self.watch)?;
+                *work += cost;
+                known.push((own, search.best()));
+                search.best()
+            };
+            hypers.push(hyper);
+        }
+        Ok(hypers)
+    }
+
+    /// Learns from the training touches and is tried on the others.
+    fn learn(&self, set: &Candidate, hyper: &Hyper) -> (JudgedSet, Work) {
+        let (noisy, trial, budget) = (&self.noisy, self.trial, self.budget);
+        let effort = Effort {
+            tolerance: budget.svr_tolerance_mm,
+            max_steps: budget.svr_steps,
+        };
+        let effort = effort.scaled(scale::decade(trial.train_targets));
+        let train = noisy.train.select_rows(&set.rows);
+        let model = PositionModel::train(&train, trial.train_targets, hyper, effort);
+        let predicted = model.predict(&noisy.test.select_rows(&set.rows));
+        let built = model.predict(&noisy.workshop.select_rows(&set.rows));
+        let judged = JudgedSet {
+            set: set.id(),
+            hyper: Some(*hyper),
+            converged: Some(model.converged().0),
+            drawn: distances(&predicted, trial.test_targets),
+            built: distances(&built, trial.test_targets),
+        };
+        (judged, model.work)
+    }
+
+    /// Failures of each selector's last set; the baseline of all candidates is none.
+    fn fail(&self, sets: &[Candidate], hypers: &[Hyper]) -> Result<Vec<Failures>, Cancelled> {
+        let (noisy, trial, budget) = (&self.noisy, self.trial, self.budget);
+        if budget.failure_subsets == 0 {
+            return Ok(Vec::new());
+        }
+        let touches = evenly(trial.train_targets.len(), budget.failure_touches);
+        let targets: Vec<[f64; 3]> = touches.iter().map(|&t| trial.train_targets[t]).collect();
+        let train = noisy.train.select_columns(&touches);
+        (0..sets.len())
+            .filter(|&k| is_largest(sets, k) && sets[k].rows.len() > 1)
+            .map(|k| {
+                let set = &sets[k];
+                let rows = failures(
+                    &FailureTrial {
+                        train: &train.select_rows(&set.rows),
+                        train_targets: &targets,
+                        test: &noisy.test.select_rows(&set.rows),
+                        test_targets: trial.test_targets,
+                        hyper: hypers[k],
+                        effort: tuning_effort(budget, trial),
+                        failed: MOST_FAILED,
+                        subsets: budget.failure_subsets,
+                        seed: trial.seed,
+                    },
+                    self.watch,
+                )?;
+                Ok(Failures {
+                    set: set.id(),
+                    touches: touches.len(),
+                    rows,
+                })
+            })
+            .collect()
+    }
 }
 
 impl Evaluation {

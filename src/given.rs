@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use crate::budget::{Budget, Watch};
 use crate::design::{self, Built, Checks, DesignError, Inputs};
-use crate::elasticity::estimate::{BEYOND, Discretization};
+use crate::elasticity::estimate::{AccuracyTarget, BEYOND, Discretization};
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::observe::{Face, Observer, SiteFrame};
 use crate::elasticity::respond::{Quantity, Responses, respond};
@@ -97,7 +97,8 @@ pub fn answer_sifted(
 
     let ground = design::ground(&inputs, watch)?;
     ground.check(&inputs.project)?;
-    let built = ground.build(&touches, &places, &budget.elements, watch)?;
+    let target = AccuracyTarget::new(&touches, &places, &budget.elements);
+    let built = ground.build(&target, watch)?;
     let checks = Checks::of(&built);
     let Built {
         meshed,

@@ -54,6 +54,15 @@ impl Disturbed {
         }
     }
 
+    /// How warm the part is (°C): what all channels drift by together is its warming.
+    pub fn temperature(&self, seconds: f64) -> f64 {
+        /// Where nothing drifts (°C).
+        const ROOM: f64 = 23.0;
+        /// Strain a degree that a gauge made for steel shows on nylon: the one expands by 80e-6 more than the other.
+        const APPARENT: f64 = 80e-6;
+        ROOM + (self.what.warming * seconds + self.wandered) / APPARENT
+    }
+
     /// So long (s) goes by: what all channels wander by follows an Ornstein–Uhlenbeck process, which begins at rest.
     pub fn pass(&mut self, step: f64) {
         if let Some((deviation, time)) = self.what.wander {

@@ -15,7 +15,8 @@ pub struct DatasetArgs {
     /// The folder of `hapdef collect`.
     pub folder: PathBuf,
     /// The dataset (.npz): `X` (strain, gauges × touches), `p_m`, `force_n`, `depth_m`, `groups` (the press of each touch,
-    /// never divided between learning and judging), `time_s`, and the keys of limb and board.
+    /// never divided between learning and judging), `time_s`, `temperature_c` (where the board says it), and the keys of limb,
+    /// board and machine.
     #[arg(long)]
     pub out: PathBuf,
     /// The same as a table (.csv).
@@ -59,7 +60,7 @@ pub fn run(args: &DatasetArgs) -> anyhow::Result<()> {
         presses,
         columns,
     } = CollectedRun::read(&args.folder, wanted)?;
-    columns.write_npz(&args.out, &about.limb, &board)?;
+    columns.write_npz(&args.out, &about, &board)?;
     if let Some(path) = &args.csv {
         columns.write_csv(path)?;
     }
@@ -70,6 +71,7 @@ pub fn run(args: &DatasetArgs) -> anyhow::Result<()> {
         "largest_force_n": columns.forces.iter().copied().reduce(f64::max),
         "board": board,
         "limb": about.limb,
+        "machine": about.machine_key(),
     });
     if args.json {
         return out::line(&said.to_string());

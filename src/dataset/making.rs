@@ -4,11 +4,10 @@
 //! Under some of the touches of a dataset, and solved for only where either may be off: they are other loads.
 
 use super::columns::Columns;
-use super::site::gauges_on;
-use crate::budget::{Cancelled, Watch};
+use super::site::{SlopesAsked, gauges_on};
+use crate::budget::Cancelled;
 use crate::elasticity::respond::{Quantity, Responses, respond};
-use crate::elasticity::{Model, Push, Touch};
-use crate::gauge::Gauge;
+use crate::elasticity::{Push, Touch};
 use crate::uncertainty::Making;
 
 /// Of a tip's radius: as far as it is made larger and smaller for the slope.
@@ -38,20 +37,13 @@ pub struct MakingSlope {
 }
 
 impl MakingSlopes {
-    /// Solves for the touches in `columns` made otherwise, as far as `making` says that they may be. Also how many
+    /// Solves for the touches that are meant made otherwise, as far as `making` says that they may be. Also how many
     /// right-hand sides that took.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
-    pub(super) fn of(
-        model: &dyn Model,
-        gauges: &[Gauge],
-        touches: &[Touch],
-        columns: &[usize],
-        making: &Making,
-        watch: Watch,
-    ) -> Result<(Self, usize), Cancelled> {
-        let pressed: Vec<Touch> = columns.iter().map(|&t| touches[t]).collect();
+    pub(super) fn of(asked: &SlopesAsked, making: &Making) -> Result<(Self, usize), Cancelled> {
+        let (model, gauges, pressed) = (asked.model, asked.gauges, asked.pressed());
         let solve = |wanted: bool, ways: fn(&Touch) -> [Push; WAYS]| {
             if !wanted || gauges.is_empty() {
                 return Ok(None);
@@ -59,10 +51,10 @@ impl MakingSlopes {
             let pushes: Vec<Push> = pressed.iter().flat_map(ways).collect();
             let (observer, angles) = gauges_on(model, gauges);
             let reading = Quantity::Gauge(&angles);
-            respond(model, &pushes, &observer, reading, watch).map(Some)
+            respond(model, &pushes, &observer, reading, asked.watch).map(Some)
         };
         let mut found = Self {
-            columns: Columns::new(columns.to_vec()),
+            columns: Columns::new(asked.columns.to_vec()),
             ..Self::default()
         };
         let mut solves = 0;

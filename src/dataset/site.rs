@@ -4,8 +4,9 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use crate::elasticity::Model;
+use crate::budget::Watch;
 use crate::elasticity::observe::{Face, Observer, SiteFrame};
+use crate::elasticity::{Model, Touch};
 use crate::gauge::Gauge;
 use crate::mesh::SurfacePoint;
 
@@ -19,6 +20,23 @@ pub struct Site {
     pub rms_strain: f64,
     /// Largest principal strain over the touches (absolute), inside face: no direction reads more.
     pub peak_strain: f64,
+}
+
+/// Gauges on a model, and the touches of a dataset under which it is asked what changes their readings.
+pub(super) struct SlopesAsked<'a> {
+    pub(super) model: &'a dyn Model,
+    pub(super) gauges: &'a [Gauge],
+    /// Those of the dataset, and which of them are meant, rising.
+    pub(super) touches: &'a [Touch],
+    pub(super) columns: &'a [usize],
+    pub(super) watch: Watch<'a>,
+}
+
+impl SlopesAsked<'_> {
+    /// The touches that are meant.
+    pub(super) fn pressed(&self) -> Vec<Touch> {
+        self.columns.iter().map(|&t| self.touches[t]).collect()
+    }
 }
 
 /// What reads the places of gauges on a model's surface, and their angles in its frames.

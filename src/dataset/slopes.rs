@@ -7,10 +7,9 @@
 use rayon::prelude::*;
 
 use super::columns::Columns;
-use super::site::gauges_on;
+use super::site::{SlopesAsked, gauges_on};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::respond::{PressedModel, Quantity, Responses, respond};
-use crate::elasticity::{Model, Touch};
 use crate::gauge::Gauge;
 use crate::uncertainty::Gluing;
 
@@ -37,30 +36,23 @@ impl GluingSlopes {
     /// them, are computed: two that are solved for, and six in single precision.
     pub const HELD: f64 = MOVES as f64 + 3.0;
 
-    /// Solves for the touches in `columns` (at least one) once more, for gauges that are moved; `turned` are the
+    /// Solves for the touches that are meant (at least one) once more, for gauges that are moved; `turned` are the
     /// slopes by the angle, sites × these touches. Also how many right-hand sides that took.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
-    pub(super) fn of(
-        model: &dyn Model,
-        gauges: &[Gauge],
-        touches: &[Touch],
-        columns: &[usize],
-        turned: Vec<f32>,
-        watch: Watch,
-    ) -> Result<(Self, usize), Cancelled> {
-        let pressed: Vec<Touch> = columns.iter().map(|&t| touches[t]).collect();
-        let moved: Vec<Gauge> = gauges.iter().flat_map(shifted).collect();
-        let (observer, angles) = gauges_on(model, &moved);
+    pub(super) fn of(asked: &SlopesAsked, turned: Vec<f32>) -> Result<(Self, usize), Cancelled> {
+        let moved: Vec<Gauge> = asked.gauges.iter().flat_map(shifted).collect();
+        let (observer, angles) = gauges_on(asked.model, &moved);
         let responses = respond(
-            model,
-            &pressed,
+            asked.model,
+            &asked.pressed(),
             &observer,
             Quantity::GaugeDifference(&angles, SLOPE),
-            watch,
+            asked.watch,
         )?;
-        let slopes = Self::read(&responses, gauges.len(), columns.to_vec(), turned);
+        let columns = asked.columns.to_vec();
+        let slopes = Self::read(&responses, asked.gauges.len(), columns, turned);
         Ok((slopes, responses.solves))
     }
 

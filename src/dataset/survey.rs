@@ -1,7 +1,7 @@
 //! Gauges anywhere on a part under the touches of a dataset: what they read where they are, and to first order beside it.
 
 use super::making::MakingSlopes;
-use super::site::{Site, StrainMoments, gauges_on};
+use super::site::{Site, SlopesAsked, StrainMoments, gauges_on};
 use super::slopes::{self, GluingSlopes};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::Touch;
@@ -86,14 +86,14 @@ pub fn survey(
     }
     let read_gauges: Vec<Gauge> = read.iter().map(|(site, ..)| site.gauge).collect();
     let (changes, solves) = GluingSlopes::under(pressed, &read_gauges, turned, watch)?;
-    let (otherwise, more) = MakingSlopes::of(
-        pressed.model(),
-        &read_gauges,
+    let asked = SlopesAsked {
+        model: pressed.model(),
+        gauges: &read_gauges,
         touches,
-        &columns,
-        making,
+        columns: &columns,
         watch,
-    )?;
+    };
+    let (otherwise, more) = MakingSlopes::of(&asked, making)?;
     let surveyed = (read.into_iter().enumerate()).map(|(i, (site, x, mean))| Surveyed {
         site,
         x,

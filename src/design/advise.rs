@@ -12,6 +12,7 @@ use super::ground::solid_ground;
 use super::layout::size;
 use super::{DesignError, Ground, Inputs, ground};
 use crate::budget::Watch;
+use crate::elasticity::estimate::AccuracyTarget;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
 use crate::elasticity::solid::sizing::PartMeasures;
 use crate::elasticity::{ElasticError, Touch, scope};
@@ -120,8 +121,11 @@ fn of_solid(
     let places: Vec<DVec3> = on_inside.into_iter().map(|at| inside.point(at)).collect();
     let sites = sites(inputs, solid);
     let order = |foreseen: &Foreseen| solid.has_tetrahedra().then_some(foreseen.order);
-    let aim = &asked.budget.elements;
-    match solid.foresee(&touches, &places, asked.touches, aim, watch) {
+    let target = AccuracyTarget {
+        count: asked.touches,
+        ..AccuracyTarget::new(&touches, &places, &asked.budget.elements)
+    };
+    match solid.foresee(&target, watch) {
         Ok(foreseen) => Ok((asked.looked_at(&foreseen, order(&foreseen), sites), None)),
         Err(stop @ ElasticError::Cancelled(_)) => Err(stop.into()),
         Err(why) => Ok((asked.unsolved(solid, sites), Some(why.to_string()))),

@@ -6,6 +6,7 @@ use super::judge::{JudgedOn, Tried, measured_by};
 use super::layout::{lay_out_sites, touches_on};
 use super::{Design, DesignError, Inputs, Meshed, Reference, Simulated, ground};
 use crate::budget::{Budget, ElementBudget, Watch};
+use crate::elasticity::estimate::AccuracyTarget;
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::{Candidate, EvaluationRow, Judging};
 
@@ -67,7 +68,9 @@ impl Finest {
             project.budget.seed,
             (true, false),
         )?;
-        let coarse = ground.build(&sample, &places, &FINEST, watch)?.meshed;
+        let coarse = ground
+            .build(&AccuracyTarget::new(&sample, &places, &FINEST), watch)?
+            .meshed;
         let (meshed, model) = coarse.reference_model(watch)?;
         let surface = meshed.touched_surface();
         let seed = project.budget.seed.wrapping_add(JUDGE_SEED);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::layout::{check_shape, size};
 use super::{DesignError, Inputs, LAYOUT, Meshed};
 use crate::budget::{Cancelled, ElementBudget, Watch};
-use crate::elasticity::estimate::Discretization;
+use crate::elasticity::estimate::{AccuracyTarget, Discretization};
 use crate::elasticity::grade::{self, Graded};
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::model::LoadCheck;
@@ -315,20 +315,18 @@ impl Ground {
     ///
     /// # Errors
     /// [`DesignError`] for what cannot be computed.
-    pub fn build(
-        &self,
-        touches: &[Touch],
-        places: &[DVec3],
-        aim: &ElementBudget,
-        watch: Watch,
-    ) -> Result<Built, DesignError> {
+    pub fn build(&self, target: &AccuracyTarget, watch: Watch) -> Result<Built, DesignError> {
         /// Vertices of a model that says anything at all.
         const LEAST: usize = 400;
-        let mut aim = *aim;
+        let mut aim = *target.aim;
         let mut is_short = false;
         loop {
-            let most = aim.most_for(touches.len());
-            match self.build_within(touches, places, &aim, watch) {
+            let most = aim.most_for(target.count);
+            let target = AccuracyTarget {
+                aim: &aim,
+                ..*target
+            };
+            match self.build_within(&target, watch) {
                 Err(DesignError::Elastic(error)) if error.is_memory() && most > LEAST => {
                     aim.most_vertices = (most / 2).max(LEAST);
                     aim.vertices = aim.vertices.min(aim.most_vertices);
@@ -344,13 +342,7 @@ impl Ground {
         }
     }
 
-    fn build_within(
-        &self,
-        touches: &[Touch],
-        places: &[DVec3],
-        aim: &ElementBudget,
-        watch: Watch,
-    ) -> Result<Built, DesignError> {
+    fn build_within(&self, target: &AccuracyTarget, watch: Watch) -> Result<Built, DesignError> {
         match self {
             Self::Shell(shell) => {
                 let Graded {
@@ -362,7 +354,7 @@ impl Ground {
                     models,
                     solves,
                     ..
-                } = shell.grade(touches, places, aim, watch)?;
+                } = shell.grade(target, watch)?;
                 Ok(Built {
                     meshed: Meshed::Shell(Arc::clone(shell), remeshed),
                     model: Box::new(model),
@@ -375,7 +367,7 @@ impl Ground {
                 })
             }
             Self::Solid(solid) => {
-                let graded = solid.grade(touches, places, aim, watch)?;
+                let graded = solid.grade(target, watch)?;
                 Ok(Built {
                     meshed: Meshed::Solid(Arc::clone(solid), graded.fineness),
                     model: Box::new(graded.model),

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::ground::{Ground, ground};
 use super::layout::lay_out_sites;
-use super::simulate::{Checks, JudgedElements, finish};
+use super::simulate::{Checks, JudgedElements, SignalReader};
 use super::{DesignError, Inputs, Meshed, Simulated};
 use crate::budget::{Budget, Watch, Work};
 use crate::dataset::Dataset;
@@ -88,5 +88,11 @@ pub fn simulate_kept(
         work: Work::default(),
     };
     let read = (kept.dataset, kept.unknowns);
-    finish(inputs, budget, known, read, &places, watch).map(Some)
+    let reader = SignalReader {
+        inputs,
+        budget,
+        places: &places,
+        watch,
+    };
+    reader.finish(known, read).map(Some)
 }

@@ -17,6 +17,7 @@ use super::nearness::check_on_part;
 use super::{Built, DesignError, Ground, Inputs, Meshed, ground};
 use crate::budget::{Budget, Cancelled, MAP_TRIANGLES, Watch};
 use crate::dataset::SignalMatrix;
+use crate::elasticity::estimate::AccuracyTarget;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Model, Touch};
 use crate::gauge::Gauge;
@@ -216,7 +217,8 @@ fn graded_model(
     let touches = lay_out_touches(&ground.touch_layout(), inputs, budget)?;
     let sites = lay_out_sites(&even, inputs)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| even.point(at)).collect();
-    let built = ground.build(&touches, &places, &budget.elements, watch)?;
+    let target = AccuracyTarget::new(&touches, &places, &budget.elements);
+    let built = ground.build(&target, watch)?;
     Ok((ground, built))
 }
 

@@ -15,7 +15,7 @@ use super::on_supports::on_supports;
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, AskedSignals, Dataset, Surveyed};
-use crate::elasticity::estimate::Discretization;
+use crate::elasticity::estimate::{AccuracyTarget, Discretization};
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::{DofSet, Model, Touch};
 use crate::feasible::SiteSurroundings;
@@ -145,7 +145,8 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     check_memory(sites.len(), count, project.gauge.signal)?;
     let touches = lay_out_touches(&ground.touch_layout(), inputs, budget)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
-    let built = ground.build(&touches, &places, &budget.elements, watch)?;
+    let target = AccuracyTarget::new(&touches, &places, &budget.elements);
+    let built = ground.build(&target, watch)?;
     let checks = Checks::of(&built);
     let Built {
         meshed,
@@ -171,7 +172,13 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
             ..Work::default()
         },
     };
-    read(inputs, budget, known, &*model, (touches, &places), watch)
+    let reader = SignalReader {
+        inputs,
+        budget,
+        places: &places,
+        watch,
+    };
+    reader.read(known, &*model, touches)
 }
 
 /// Refuses gauges that are required farther from the part than it is large.
@@ -234,7 +241,13 @@ pub fn simulate_again(
     };
     let model = last.meshed.model(watch)?;
     let touches = last.dataset.touches.clone();
-    read(inputs, budget, known, &*model, (touches, &places), watch)
+    let reader = SignalReader {
+        inputs,
+        budget,
+        places: &places,
+        watch,
+    };
+    reader.read(known, &*model, touches)
 }
 
 /// Elements with what is known of them.
@@ -249,106 +262,120 @@ pub(super) struct JudgedElements {
     pub work: Work,
 }
 
-/// What sites at some places (m) report of touches on a model, with everything that its reader must know.
-fn read(
-    inputs: &Inputs,
-    budget: &Budget,
-    known: JudgedElements,
-    model: &dyn Model,
-    (touches, places): (Vec<Touch>, &[DVec3]),
-    watch: Watch,
-) -> Result<Simulated, DesignError> {
-    let project = &inputs.project;
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index().nearest(p).0).collect();
-    let unknowns = model.system().dimension();
-    let asked = AskedSignals {
-        signal: project.gauge.signal,
-        directions: project.gauge.directions,
-        slope_touches: &evenly(touches.len(), SLOPE_TOUCHES),
-        making: &project.uncertainty().making_allowed(),
-    };
-    let mut dataset = dataset::simulate(model, touches, &points, &asked, watch)?;
-    dataset.work += known.work;
-    finish(inputs, budget, known, (dataset, unknowns), places, watch)
+/// Reads what sites at some places report.
+pub(super) struct SignalReader<'a> {
+    pub inputs: &'a Inputs,
+    pub budget: &'a Budget,
+    /// Where sites are (m).
+    pub places: &'a [DVec3],
+    pub watch: Watch<'a>,
 }
 
-/// A simulation of what was read on elements of so many unknowns, with everything that its reader must know.
-pub(super) fn finish(
-    inputs: &Inputs,
-    budget: &Budget,
-    known: JudgedElements,
-    (dataset, unknowns): (Dataset, usize),
-    places: &[DVec3],
-    watch: Watch,
-) -> Result<Simulated, DesignError> {
-    let JudgedElements {
-        meshed,
-        estimate,
-        linearity,
-        checks,
-        is_short,
-        ..
-    } = known;
-    let project = &inputs.project;
-    let mut notes = if dataset.touches.len() < project.touch.count {
-        vec![format!(
-            "{} touches instead of the project's {}: the budget of this quality.",
-            dataset.touches.len(),
-            project.touch.count
-        )]
-    } else {
-        Vec::new()
-    };
-    let mut cautious = checks.distrust();
-    cautious.extend(cautions(&estimate, linearity.as_ref(), project, budget));
-    cautious.extend(meshed.cautions(project.tip().1));
-    cautious.extend(large_motion(&inputs.part, &estimate, linearity.as_ref()));
-    cautious.extend(wide_tip(&inputs.part, project.tip().1));
-    cautious.extend(open_solid(inputs));
-    cautious.extend(overlapping_tetrahedra(inputs));
-    cautious.extend(required_off(inputs));
-    cautious.extend(on_supports(inputs, &dataset.touches)?);
-    cautious.extend(short_of_memory(is_short));
-    let (mesh, held) = meshed.gauge_surface();
-    let index = mesh.index();
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| index.nearest(p).0).collect();
-    let ground = Ground::of(&meshed);
-    let surroundings = ground.surroundings(&points, watch)?;
-    notes.extend(ground.left_out(surroundings.as_ref()));
-    let surroundings = surroundings.map(SiteSurroundings::opened);
-    let carried = carry(&mesh, &inputs.part);
-    Ok(Simulated {
-        achieved: Achieved {
-            error_estimate: Some(estimate.strain_percent),
-            unit: "% of a load's largest strain",
-            effort: dataset.work,
-            stop_reason: if estimate.meets(&budget.elements) {
-                StopReason::Converged
-            } else {
-                StopReason::EffortSpent
+impl SignalReader<'_> {
+    /// What the sites report of touches on a model, with everything that its reader must know.
+    fn read(
+        &self,
+        known: JudgedElements,
+        model: &dyn Model,
+        touches: Vec<Touch>,
+    ) -> Result<Simulated, DesignError> {
+        let project = &self.inputs.project;
+        let points: Vec<SurfacePoint> = (self.places.iter())
+            .map(|&p| model.index().nearest(p).0)
+            .collect();
+        let unknowns = model.system().dimension();
+        let asked = AskedSignals {
+            signal: project.gauge.signal,
+            directions: project.gauge.directions,
+            slope_touches: &evenly(touches.len(), SLOPE_TOUCHES),
+            making: &project.uncertainty().making_allowed(),
+        };
+        let mut dataset = dataset::simulate(model, touches, &points, &asked, self.watch)?;
+        dataset.work += known.work;
+        self.finish(known, (dataset, unknowns))
+    }
+
+    /// A simulation of what was read on elements of so many unknowns, with everything that its reader must know.
+    pub(super) fn finish(
+        &self,
+        known: JudgedElements,
+        (dataset, unknowns): (Dataset, usize),
+    ) -> Result<Simulated, DesignError> {
+        let Self {
+            inputs,
+            budget,
+            places,
+            watch,
+        } = *self;
+        let JudgedElements {
+            meshed,
+            estimate,
+            linearity,
+            checks,
+            is_short,
+            ..
+        } = known;
+        let project = &inputs.project;
+        let mut notes = if dataset.touches.len() < project.touch.count {
+            vec![format!(
+                "{} touches instead of the project's {}: the budget of this quality.",
+                dataset.touches.len(),
+                project.touch.count
+            )]
+        } else {
+            Vec::new()
+        };
+        let mut cautious = checks.distrust();
+        cautious.extend(cautions(&estimate, linearity.as_ref(), project, budget));
+        cautious.extend(meshed.cautions(project.tip().1));
+        cautious.extend(large_motion(&inputs.part, &estimate, linearity.as_ref()));
+        cautious.extend(wide_tip(&inputs.part, project.tip().1));
+        cautious.extend(open_solid(inputs));
+        cautious.extend(overlapping_tetrahedra(inputs));
+        cautious.extend(required_off(inputs));
+        cautious.extend(on_supports(inputs, &dataset.touches)?);
+        cautious.extend(short_of_memory(is_short));
+        let (mesh, held) = meshed.gauge_surface();
+        let index = mesh.index();
+        let points: Vec<SurfacePoint> = places.iter().map(|&p| index.nearest(p).0).collect();
+        let ground = Ground::of(&meshed);
+        let surroundings = ground.surroundings(&points, watch)?;
+        notes.extend(ground.left_out(surroundings.as_ref()));
+        let surroundings = surroundings.map(SiteSurroundings::opened);
+        let carried = carry(&mesh, &inputs.part);
+        Ok(Simulated {
+            achieved: Achieved {
+                error_estimate: Some(estimate.strain_percent),
+                unit: "% of a load's largest strain",
+                effort: dataset.work,
+                stop_reason: if estimate.meets(&budget.elements) {
+                    StopReason::Converged
+                } else {
+                    StopReason::EffortSpent
+                },
+                cautions: cautious,
+                notes,
             },
-            cautions: cautious,
-            notes,
-        },
-        element_mm: meshed.element_mm(),
-        mesh,
-        meshed,
-        held,
-        carried,
-        discretization: estimate,
-        length_scale: (dataset.slopes.as_ref()).map_or(f64::NAN, |slopes| {
-            slopes.length_scale(&|site| dataset.x.row(site))
-        }),
-        points,
-        surroundings,
-        lattice: dataset.sites.len(),
-        mark: Arc::default(),
-        dataset,
-        unknowns,
-        linearity,
-        checks,
-        is_short,
-    })
+            element_mm: meshed.element_mm(),
+            mesh,
+            meshed,
+            held,
+            carried,
+            discretization: estimate,
+            length_scale: (dataset.slopes.as_ref()).map_or(f64::NAN, |slopes| {
+                slopes.length_scale(&|site| dataset.x.row(site))
+            }),
+            points,
+            surroundings,
+            lattice: dataset.sites.len(),
+            mark: Arc::default(),
+            dataset,
+            unknowns,
+            linearity,
+            checks,
+            is_short,
+        })
+    }
 }
 
 impl Simulated {

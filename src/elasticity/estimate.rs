@@ -28,6 +28,32 @@ const GAUGE: f64 = 0.6;
 /// Strains are judged farther than this from the touch, in tip radii.
 pub const BEYOND: f64 = 2.0;
 
+/// What elements have to be good enough for.
+#[derive(Clone, Copy, Debug)]
+pub struct AccuracyTarget<'a> {
+    /// The touches, or some that stand for them.
+    pub touches: &'a [Touch],
+    /// Places on the inside where strains matter (m).
+    pub places: &'a [DVec3],
+    /// Touches that will be solved for: what they take counts.
+    pub count: usize,
+    /// The errors that are allowed, and the most that may be spent on them.
+    pub aim: &'a ElementBudget,
+}
+
+impl<'a> AccuracyTarget<'a> {
+    /// For just these touches.
+    #[must_use]
+    pub fn new(touches: &'a [Touch], places: &'a [DVec3], aim: &'a ElementBudget) -> Self {
+        Self {
+            touches,
+            places,
+            count: touches.len(),
+            aim,
+        }
+    }
+}
+
 /// Estimated discretization error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Discretization {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::estimate::{self, Discretization, ModelSample};
+use super::estimate::{self, AccuracyTarget, Discretization, ModelSample};
 use super::linearity::{Linearity, linearity};
 use super::load::Touch;
 use super::model::LoadCheck;
@@ -231,21 +231,15 @@ impl ShellGround {
     }
 
     /// Lays elements for these touches, finer where their strain changes, until the error is small
-    /// enough or the most vertices are spent. `places` (m) are where strains matter.
+    /// enough or the most vertices are spent.
     ///
     /// # Errors
     /// [`ElasticError`] for what cannot be computed.
-    pub fn grade(
-        &self,
-        touches: &[Touch],
-        places: &[DVec3],
-        aim: &ElementBudget,
-        watch: Watch,
-    ) -> Result<Graded, ElasticError> {
-        let as_given = self.own.is_none();
-        let most = aim.most_for(touches.len());
-        let touches = sample(touches);
-        let places: Vec<DVec3> = subsample(places, PLACES);
+    pub fn grade(&self, target: &AccuracyTarget, watch: Watch) -> Result<Graded, ElasticError> {
+        let (as_given, aim) = (self.own.is_none(), target.aim);
+        let most = aim.most_for(target.count);
+        let touches = sample(target.touches);
+        let places: Vec<DVec3> = subsample(target.places, PLACES);
         // A second round for a few more vertices would cost more than it brings.
         let near = 2 * most <= 3 * aim.vertices;
         let mut vertices = if near { most } else { aim.vertices };

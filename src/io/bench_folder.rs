@@ -29,6 +29,8 @@ pub const PLAN: &str = "plan.csv";
 pub const LIMB: &str = "limb_key";
 /// See [`LIMB`].
 pub const BOARD: &str = "board_key";
+/// The same of the machine that pressed, as its file describes it.
+pub const MACHINE: &str = "machine_key";
 
 /// What such an array of a dataset says; nothing where there is none.
 ///
@@ -119,6 +121,17 @@ impl PressedPart {
             return Err(FileError::broken(&path, what));
         }
         Ok(Some(about))
+    }
+
+    /// Key of the machine; empty where somebody pressed by hand.
+    #[must_use]
+    pub fn machine_key(&self) -> String {
+        if self.machine.is_empty() {
+            return String::new();
+        }
+        let mut key = Fingerprint::default();
+        key.add(self.machine.bytes());
+        key.hex()
     }
 
     /// Into a folder.
@@ -228,14 +241,21 @@ pub struct TouchColumns {
     pub groups: Vec<u32>,
     /// On the board's clock (s).
     pub seconds: Vec<f64>,
+    /// Of the board (°C); not a number where it did not say that.
+    pub temperatures: Vec<f64>,
 }
 
 impl TouchColumns {
-    /// Writes them as NPZ, with the keys of limb and board.
+    /// Writes them as NPZ, with what they are of: the part, and the key of the board.
     ///
     /// # Errors
     /// [`FileError`] where it cannot be written.
-    pub fn write_npz(&self, path: &Path, limb: &str, board: &str) -> Result<(), FileError> {
+    pub fn write_npz(
+        &self,
+        path: &Path,
+        about: &PressedPart,
+        board: &str,
+    ) -> Result<(), FileError> {
         let build = || -> std::io::Result<NpzFile> {
             let mut file = NpzFile::default();
             let (touches, gauges) = (self.places.len(), self.strains.first().map_or(0, Vec::len));
@@ -250,8 +270,12 @@ impl TouchColumns {
             }
             file.add("depth_m", &[touches], &self.depths)?;
             file.add("time_s", &[touches], &self.seconds)?;
+            if self.temperatures.iter().any(|t| t.is_finite()) {
+                file.add("temperature_c", &[touches], &self.temperatures)?;
+            }
             file.add("groups", &[touches], &self.groups)?;
-            for (name, key) in [(LIMB, limb), (BOARD, board)] {
+            let machine = about.machine_key();
+            for (name, key) in [(LIMB, &about.limb[..]), (BOARD, board), (MACHINE, &machine)] {
                 file.add(name, &[key.len()], key.as_bytes())?;
             }
             Ok(file)
@@ -266,16 +290,23 @@ impl TouchColumns {
     pub fn write_csv(&self, path: &Path) -> Result<(), FileError> {
         let gauges = self.strains.first().map_or(0, Vec::len);
         let names = [
-            "press", "t_s", "x_mm", "y_mm", "z_mm", "depth_mm", "force_n",
+            "press",
+            "t_s",
+            "x_mm",
+            "y_mm",
+            "z_mm",
+            "depth_mm",
+            "force_n",
+            "temperature_c",
         ];
         let microstrain = (0..gauges).map(|g| format!("gauge_{}_microstrain", g + 1));
         let mut table = Writing::new(names.map(str::to_owned).into_iter().chain(microstrain));
         for k in 0..self.places.len() {
             let p = self.places[k] * 1e3;
-            let force = self
-                .forces
-                .get(k)
-                .map_or(String::new(), |f| format!("{f:.4}"));
+            let or_nothing = |value: Option<&f64>, digits: usize| {
+                let value = value.filter(|v| v.is_finite());
+                value.map_or(String::new(), |v| format!("{v:.digits$}"))
+            };
             let mut cells = vec![
                 self.groups[k].to_string(),
                 format!("{:.6}", self.seconds[k]),
@@ -283,7 +314,8 @@ impl TouchColumns {
                 format!("{:.4}", p.y),
                 format!("{:.4}", p.z),
                 format!("{:.4}", self.depths[k] * 1e3),
-                force,
+                or_nothing(self.forces.get(k), 4),
+                or_nothing(self.temperatures.get(k), 2),
             ];
             cells.extend(self.strains[k].iter().map(|s| format!("{:.4}", s * 1e6)));
             table.row(cells);

@@ -99,6 +99,8 @@ impl BenchWriter {
                 Input::Log { .. } | Input::Note { .. } | Input::Pong(_) => {}
             }
         }
+        self.recorder
+            .temperature(self.receiver.traffic.temperature());
     }
 
     /// What the collector says without a sample.

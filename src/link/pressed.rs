@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::counted_line::CountedLine;
+use super::counted_line::{CountedLine, number};
 use crate::bench::SampleMean;
 use crate::live::{Input, Receiver};
 use crate::wire::Hello;
@@ -35,6 +35,8 @@ pub struct Depth {
     pub time_us: u64,
     /// Mean of each channel (counts).
     pub counts: Vec<f64>,
+    /// How warm the board was (°C), where it says that.
+    pub temperature: Option<f64>,
 }
 
 /// All presses that were finished in a recording's bytes, in their order. What was cut off in the middle is none.
@@ -43,6 +45,10 @@ pub fn bench_presses(bytes: &[u8]) -> Vec<BenchPress> {
     let mut scribe = PressScribe::default();
     let mut receiver = Receiver::default();
     receiver.push(bytes, 0, |input| scribe.take(input));
+    // Boards say now and then how warm they are: before the first time it was as then.
+    let unknown = (scribe.done.iter_mut().flat_map(|p| &mut p.steps))
+        .filter(|step| step.temperature.is_none());
+    unknown.for_each(|step| step.temperature = scribe.first_temperature);
     scribe.done
 }
 
@@ -56,6 +62,9 @@ struct PressScribe {
     done: Vec<BenchPress>,
     /// Presses since that place was last found to be as at first, where there is such a place.
     doubted: Option<Vec<BenchPress>>,
+    /// How warm the board said it is (°C).
+    temperature: Option<f64>,
+    first_temperature: Option<f64>,
     /// Of a board that prints lines.
     line: CountedLine,
 }
@@ -92,6 +101,10 @@ impl PressScribe {
                 if let Some(press) = &mut self.open {
                     press.force = rest.parse().ok();
                 }
+            }
+            "temperature" => {
+                self.temperature = number(rest);
+                self.first_temperature = self.first_temperature.or(self.temperature);
             }
             "again" | "failed" => (self.open, self.reading) = (None, None),
             "pressed" => {
@@ -143,6 +156,7 @@ impl PressScribe {
                         below: mm * 1e-3,
                         time_us,
                         counts,
+                        temperature: self.temperature,
                     });
                 }
             }

@@ -127,6 +127,8 @@ impl RecordScribe {
                 Input::Log { .. } | Input::Note { .. } | Input::Pong(_) => {}
             }
         }
+        self.recorder
+            .temperature(self.receiver.traffic.temperature());
     }
 
     /// A sample behind what was true when it was taken.

@@ -21,6 +21,8 @@ const OLD_NOTE: &str = "hapdef ";
 /// come later than they should by it: what waited somewhere on the way is soon made up for.
 const APART_US: u64 = 500_000;
 const LATE_US: u64 = 10_000_000;
+/// A temperature is written again when it has changed by this (°C).
+const WARMER: f64 = 0.1;
 /// Values of a line that surely fit into one frame.
 const VALUES: usize = 8;
 
@@ -35,6 +37,8 @@ pub struct Recorder {
     layout: Option<(usize, u8)>,
     time_us: u64,
     clock: RecordedClock,
+    /// What was written last (°C).
+    temperature: Option<f64>,
     pub samples: u64,
     pub bytes: u64,
     /// Why it ended by itself.
@@ -70,6 +74,7 @@ impl Recorder {
             layout: None,
             time_us: 0,
             clock: RecordedClock::default(),
+            temperature: None,
             samples: 0,
             bytes: 0,
             failed: None,
@@ -128,6 +133,18 @@ impl Recorder {
         self.own(&format!("clock {unix_us}"));
     }
 
+    /// How warm the board said it is (°C), where it does: it is written where it is news.
+    pub fn temperature(&mut self, celsius: Option<f64>) {
+        let is_news = |now: &f64| {
+            self.temperature
+                .is_none_or(|last| (now - last).abs() >= WARMER)
+        };
+        if let Some(now) = celsius.filter(is_news) {
+            self.temperature = Some(now);
+            self.own(&format!("temperature {now:.2}"));
+        }
+    }
+
     /// Plain lines may hold anything, and more than a frame does.
     fn line(&mut self, counts: &[f64]) {
         let last = counts.len().saturating_sub(1) / VALUES;
@@ -139,7 +156,7 @@ impl Recorder {
         }
     }
 
-    /// What was done: “tare”, “rest …”, “truth …”, “clock …”.
+    /// What was done: “tare”, “rest …”, “truth …”, “clock …”, “temperature …”.
     pub fn own(&mut self, text: &str) {
         self.put(&WireMessage::Note(text.to_owned()));
     }
@@ -234,6 +251,7 @@ pub fn old_note(level: u8, text: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::live::{Input, Receiver};
 
     #[test]
     fn one_that_was_never_written_to_is_not_in_the_way() {
@@ -264,6 +282,25 @@ mod tests {
         // This machine's clock is set back; the board begins anew.
         assert!(is_news(21 * S, 50 * S) && is_news(5, 51 * S));
         assert!(!is_news(S, 52 * S));
+    }
+
+    #[test]
+    fn a_temperature_is_written_where_it_is_news() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hapdrec");
+        let mut recorder = Recorder::create(&path).unwrap();
+        for celsius in [None, Some(21.5), Some(21.55), Some(21.62), None, Some(21.5)] {
+            recorder.temperature(celsius);
+        }
+        drop(recorder);
+        let (mut receiver, mut said) = (Receiver::default(), Vec::new());
+        receiver.push(&std::fs::read(&path).unwrap(), 0, |input| {
+            if let Input::Note { text, .. } = input {
+                said.push(text);
+            }
+        });
+        let wanted = ["21.50", "21.62", "21.50"].map(|c| format!("temperature {c}"));
+        assert_eq!(said, wanted);
     }
 
     #[cfg(target_os = "linux")]

@@ -124,6 +124,8 @@ impl Listener {
                     for input in inputs.drain(..) {
                         self.take(input, arrived, port, tell);
                     }
+                    let temperature = self.receiver.traffic.temperature();
+                    self.record(|r| r.temperature(temperature));
                 }
             }
             // Bytes that cannot be used are silence too.

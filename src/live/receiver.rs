@@ -51,6 +51,16 @@ pub struct Traffic {
     pub refused: u64,
     /// That the board itself could not send.
     pub overruns: u32,
+    /// What the board said last of its temperature (hundredths of a degree Celsius).
+    pub temperature_centi: Option<i16>,
+}
+
+impl Traffic {
+    /// What the board said last of its temperature (°C).
+    #[must_use]
+    pub fn temperature(&self) -> Option<f64> {
+        self.temperature_centi.map(|centi| f64::from(centi) / 100.0)
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -246,7 +256,13 @@ impl Receiver {
                     counts,
                 }));
             }
-            WireMessage::Status { overruns, .. } => self.traffic.overruns = overruns,
+            WireMessage::Status {
+                overruns,
+                temperature_centi,
+            } => {
+                self.traffic.overruns = overruns;
+                self.traffic.temperature_centi = temperature_centi;
+            }
             WireMessage::Log { level, text } => tell(Input::Log {
                 level,
                 text,

@@ -130,7 +130,10 @@ impl HandRun {
                         desk.hear(news, &mut tell);
                     }
                 }
-                SessionEvent::Turn { .. } => desk.obey(orders, &mut tell),
+                SessionEvent::Turn { traffic, .. } => {
+                    desk.recorder.temperature(traffic.temperature());
+                    desk.obey(orders, &mut tell);
+                }
                 _ => {}
             }
             if desk.is_over() {

@@ -180,6 +180,8 @@ fn columns(
             columns.depths.push(step.below);
             columns.groups.push(press.number as u32);
             columns.seconds.push(step.time_us as f64 * 1e-6);
+            let temperature = step.temperature.unwrap_or(f64::NAN);
+            columns.temperatures.push(temperature);
         }
     }
     Ok(columns)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use hapdef::budget::{ElementBudget, unwatched};
-use hapdef::elasticity::estimate::under_load;
+use hapdef::elasticity::estimate::{AccuracyTarget, under_load};
 use hapdef::elasticity::grade::{Graded, ShellGround};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::support::HeldRegion;
@@ -169,8 +169,9 @@ impl Disc {
 
     pub fn graded(&self, aim: &ElementBudget, as_given: bool) -> Graded {
         let ground = ShellGround::new(&self.part, self.section, &[self.support()], as_given);
+        let (touches, places) = ([self.touch], Self::places());
         ground
-            .grade(&[self.touch], &Self::places(), aim, &unwatched)
+            .grade(&AccuracyTarget::new(&touches, &places, aim), &unwatched)
             .unwrap()
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 use hapdef::budget::{ElementBudget, unwatched};
-use hapdef::elasticity::estimate::Discretization;
+use hapdef::elasticity::estimate::{AccuracyTarget, Discretization};
 use hapdef::elasticity::grade;
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
@@ -368,7 +368,8 @@ pub fn slotted_graded(aim: &ElementBudget) -> (Found, Discretization) {
         .map(|s| s.position - to_outside(s.position, wall))
         .collect();
     let pressed = on_outside(&touches, wall);
-    let graded = ground.grade(&pressed, &places, aim, &unwatched).unwrap();
+    let target = AccuracyTarget::new(&pressed, &places, aim);
+    let graded = ground.grade(&target, &unwatched).unwrap();
     let found = slotted_readings(&graded.model, wall, &touches, &sites);
     let off = departure(&found, &slotted_reference(&found));
     (off, graded.estimate)

@@ -7,7 +7,7 @@ use bench::hexes::{Bricks, ends};
 use bench::solids::clamp;
 use glam::DVec3;
 use hapdef::budget::{ElementBudget, Quality, unwatched};
-use hapdef::elasticity::estimate::{self, ModelSample};
+use hapdef::elasticity::estimate::{self, AccuracyTarget, ModelSample};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::respond::{self, Quantity, gives_way, respond_from};
 use hapdef::elasticity::solid::ground::{SolidGraded, SolidGround};
@@ -209,9 +209,8 @@ fn estimates_of_solids_are_of_the_size_of_the_error() {
             if case.name == "thick tube" && quality == Quality::Standard {
                 continue; // twenty seconds, for an error below that of its tetrahedra
             }
-            let graded = ground
-                .grade(&case.touches, &case.places, &aim, &unwatched)
-                .unwrap();
+            let target = AccuracyTarget::new(&case.touches, &case.places, &aim);
+            let graded = ground.grade(&target, &unwatched).unwrap();
             let error = off(&under(&graded.model, &case.touches), &case.truth);
             let said = graded.estimate.displacement_percent;
             println!(
@@ -231,8 +230,8 @@ fn estimates_of_solids_are_of_the_size_of_the_error() {
 
 /// What cells come to is told from the first of them: how large they are, what they take and how far off they are.
 fn are_foreseen(case: &Case, ground: &SolidGround, aim: &ElementBudget, graded: &SolidGraded) {
-    let (touches, places) = (&case.touches, &case.places);
-    let foreseen = ground.foresee(touches, places, touches.len(), aim, &unwatched);
+    let target = AccuracyTarget::new(&case.touches, &case.places, aim);
+    let foreseen = ground.foresee(&target, &unwatched);
     let foreseen = foreseen.unwrap();
     let system = graded.model.system();
     let close = |percent: f64| percent.max(OWN);
@@ -317,7 +316,8 @@ fn given_tetrahedra_are_as_far_off_as_they_say() {
         let mut first = None;
         for asked in [50.0, 8.0, 1.0] {
             let aim = asking(asked);
-            let graded = ground.grade(touches, places, &aim, &unwatched).unwrap();
+            let target = AccuracyTarget::new(touches, places, &aim);
+            let graded = ground.grade(&target, &unwatched).unwrap();
             let error = off(&under(&graded.model, &case.touches), &case.truth);
             let said = graded.estimate;
             println!(
@@ -333,7 +333,7 @@ fn given_tetrahedra_are_as_far_off_as_they_say() {
             honest(case.name, error, said.displacement_percent);
             order = graded.fineness.order;
             // What was foreseen of it: its factor and matrix from the pattern of its nodes alone.
-            let foreseen = ground.foresee(touches, places, touches.len(), &aim, &unwatched);
+            let foreseen = ground.foresee(&target, &unwatched);
             let foreseen = foreseen.unwrap();
             let system = graded.model.system();
             assert_eq!(foreseen.order, order, "{}", case.name);
@@ -425,7 +425,8 @@ fn given_tetrahedra_are_judged_whatever_the_memory() {
     let case = channel();
     let (touches, places) = (&case.touches, &case.places);
     let ground = own(&case, 4.0);
-    let graded = ground.grade(touches, places, &asking(1e6), &unwatched);
+    let aim = asking(1e6);
+    let graded = ground.grade(&AccuracyTarget::new(touches, places, &aim), &unwatched);
     let whole = graded.unwrap().estimate.displacement_percent;
     let said = ground.judge_by_pieces(touches, places, &unwatched);
     let said = said.unwrap().displacement_percent;

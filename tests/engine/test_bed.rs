@@ -108,6 +108,16 @@ fn from_the_plan_to_live_touch() {
         rows.lines().count() as u64,
         data["touches"].as_u64().unwrap() + 1
     );
+    let keys = ["limb", "board", "machine"].map(|key| data[key].as_str().unwrap().len());
+    assert!(keys.iter().all(|length| *length >= 8), "{data}");
+    // Every reading with how warm the board was, which goes on saying that after the kill.
+    let warm = rows.lines().map(|row| row.split(',').nth(7).unwrap());
+    assert_eq!(warm.clone().next(), Some("temperature_c"));
+    let celsius: Vec<f64> = warm.skip(1).map(|t| t.parse().unwrap()).collect();
+    assert!(
+        celsius.iter().all(|t| (22.0..24.0).contains(t)),
+        "{celsius:?}"
+    );
 
     said(
         folder,

@@ -172,22 +172,23 @@ fn presses_by_hand_are_collected_stopped_and_gone_on_with() {
             .position(|h| *h == name)
             .unwrap_or_else(|| panic!("{head:?}"))
     };
-    let columns = ["x_mm", "y_mm", "z_mm", "force_n"].map(column);
-    let rows: Vec<[f64; 4]> = lines
+    let columns = ["x_mm", "y_mm", "z_mm", "force_n", "temperature_c"].map(column);
+    let rows: Vec<[f64; 5]> = lines
         .map(|line| {
             let words: Vec<f64> = line.split(',').map(|w| w.parse().unwrap()).collect();
             columns.map(|c| words[c])
         })
         .collect();
     assert_eq!(rows.len(), ALL);
-    for (k, &[x, y, z, n]) in rows.iter().enumerate() {
+    for (k, &[x, y, z, n, celsius]) in rows.iter().enumerate() {
         // On the wall beside what was asked for, where that is in a window.
         let far = |place: &DVec3| place.distance(DVec3::new(x, y, z));
         let nearest = (0..ALL).min_by(|&a, &b| far(&places[a]).total_cmp(&far(&places[b])));
         assert!(nearest == Some(k) && far(&places[k]) < 10.0, "{rows:?}");
         assert!((n - force(k)).abs() < 1e-9, "{rows:?}");
+        assert!((22.0..24.0).contains(&celsius), "{rows:?}");
     }
-    let [x, y, z, _] = rows[ALL - 1];
+    let [x, y, z, ..] = rows[ALL - 1];
     let moved = format!("this one is at ({x:.1}, {y:.1}, {z:.1}) mm");
     assert!(words.contains(&moved), "{moved}: {words}");
 }

@@ -7,6 +7,8 @@
 
 mod bench;
 
+use std::path::PathBuf;
+
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -324,24 +326,21 @@ fn the_estimator_that_is_asked_for_finds_the_place() {
 }
 
 /// Twelve presses by hand: places are told up to 1 mm off along every axis (1 mm rms in all), forces up to 5 % (3 % rms), and
-/// the finger pushes 6° aside. Then a board with all that a workshop has at once.
-#[test]
-fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
+/// the finger pushes 6° aside. Also the bench on which they were made, and what was found.
+fn pressed_by_hand(seed: u64) -> (Bench, PathBuf) {
     let mut presses = in_turn(3.0, 1.6, 1.1, &places(12), 10.0);
     for (k, press) in presses.iter_mut().enumerate() {
         (press.tilt_deg, press.towards_deg) = (6.0, f64::from(101 * k as u32 % 360));
     }
-    let known = Bench::of(presses);
-    let board = ["--rate", "200", "--bits", "16"];
-    let recording = known.record(&board);
+    let known = Bench::of(presses).of_workshop(seed);
+    let recording = known.record(&WORKSHOP_BOARD);
     let told = known.at("told.csv");
     std::fs::write(&told, known.script(1.0)).unwrap();
     let found = known.at("found.hapdef.toml");
-    let project = known.project(&[]);
     hapdef(&[
         "calibrate",
         "--project",
-        text(&project),
+        text(&known.project(&[])),
         "--recording",
         text(&recording),
         "--presses",
@@ -351,14 +350,36 @@ fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
         "--out",
         text(&found),
     ]);
-    let others = Bench::of(in_turn(3.0, 1.2, 0.8, &places(31), 8.0));
-    let recording = others.record(&board);
-    let (before, _) = listen(&recording, &project);
+    (known, found)
+}
+
+/// As many workshops as `HAPDEF_HANDS` says.
+#[test]
+fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
+    let told = std::env::var("HAPDEF_HANDS").map(|n| n.parse().expect("a number"));
+    for workshop in 0..told.unwrap_or(1) {
+        by_hand(4 + workshop);
+    }
+}
+
+const WORKSHOP_BOARD: [&str; 4] = ["--rate", "200", "--bits", "16"];
+
+fn by_hand(seed: u64) {
+    let (known, found) = pressed_by_hand(seed);
+    let others = Bench::of(in_turn(3.0, 1.2, 0.8, &places(31), 8.0)).of_workshop(seed);
+    let recording = others.record(&WORKSHOP_BOARD);
+    let (before, _) = listen(&recording, &known.project(&[]));
     let (before, (off, held)) = (others.off(&before).0, {
         let (heard, _) = listen(&recording, &found);
         others.off(&heard)
     });
-    println!("by hand: {before:.2} mm before, {off:.2} after, {held:.2} held");
+    println!("workshop {seed}, by hand: {before:.2} mm before, {off:.2} after, {held:.2} held");
+    // One workshop is held to it; of many the table says how they do.
+    let hold = |holds: bool, what: &str| match seed {
+        4 => hold(holds, what),
+        _ if !holds => println!("workshop {seed} does not hold {what}"),
+        _ => {}
+    };
     hold(
         off < 0.8 && off < 0.5 * before && held > 0.8,
         "0.8 mm by hand",
@@ -370,7 +391,7 @@ fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
         press.ramp_ms = [5.0, 20.0, 80.0][k % 3];
         (press.tilt_deg, press.towards_deg) = (15.0, f64::from(47 * k as u32 % 360));
     }
-    let all = Bench::of(presses);
+    let all = Bench::of(presses).of_workshop(seed);
     let disturbed = [
         "--hum",
         "5@50.03",
@@ -381,7 +402,7 @@ fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
         "--crosstalk",
         "0.5",
     ];
-    let recording = all.record(&[&board[..], &disturbed].concat());
+    let recording = all.record(&[&WORKSHOP_BOARD[..], &disturbed].concat());
     std::fs::copy(all.at("limb.glb"), known.at("limb.glb")).unwrap();
     let (heard, _) = listen(&recording, &found);
     let (felt, (off, held), ghosts) = (all.felt(&heard), all.off(&heard), all.ghosts(&heard, 0.0));

@@ -33,6 +33,10 @@ impl Listener {
                     tell(SessionEvent::Clock { unix_us, time_us });
                 }
             }
+            ["temperature", celsius] => {
+                let centi = number(celsius).map(|c| (100.0 * c).round() as i16);
+                self.receiver.traffic.temperature_centi = centi;
+            }
             ["truth", "none"] => tell(SessionEvent::Truth(None)),
             ["truth", x, y, z, force] => {
                 if let [Some(x), Some(y), Some(z), Some(force)] = [x, y, z, force].map(number) {

@@ -310,6 +310,7 @@ fn facts(ui: &mut Ui, feed: &Feed) {
             feed.health.len()
         ));
     }
+    facts.extend(traffic.temperature().map(|t| format!("board at {t:.1} °C")));
     for fact in facts {
         ui.separator();
         ui.label(fact);

@@ -6,8 +6,9 @@ use super::SolidGround;
 use super::foreseen::{Foreseen, ModelCost, is_quick};
 use super::graded::{Grids, ORDER, STRAIN_ORDER};
 use super::solved::{SAFETY, SolvedModel};
-use crate::budget::{ElementBudget, Watch};
+use crate::budget::Watch;
 use crate::elasticity::error::ElasticError;
+use crate::elasticity::estimate::AccuracyTarget;
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::immersed::Fineness;
@@ -85,30 +86,23 @@ impl ForeseenCells<'_> {
 }
 
 impl SolidGround {
-    /// What [`Self::grade`] would come to for `count` touches like these; `places` (m) are where strains matter.
+    /// What [`Self::grade`] would come to for as many touches like these as the target counts.
     ///
     /// # Errors
     /// [`ElasticError`] for what cannot be computed.
-    pub fn foresee(
-        &self,
-        touches: &[Touch],
-        places: &[DVec3],
-        count: usize,
-        aim: &ElementBudget,
-        watch: Watch,
-    ) -> Result<Foreseen, ElasticError> {
+    pub fn foresee(&self, target: &AccuracyTarget, watch: Watch) -> Result<Foreseen, ElasticError> {
         if let Some(first) = self.own_at(FIRST) {
-            return self.foresee_raised(first, touches, places, count, aim, watch);
+            return self.foresee_raised(first, target, watch);
         }
-        let shape = self.measures();
-        let least = shape.least(aim, count);
-        let touches = sample(touches);
+        let (shape, aim) = (self.measures(), target.aim);
+        let least = shape.least(aim, target.count);
+        let touches = sample(target.touches);
         let (tip, away) = self.nearest(&touches);
         let mut size = shape.first(tip, away, least);
         let mut look = ForeseenCells {
             ground: self,
             touches,
-            places: subsample(places, PLACES),
+            places: subsample(target.places, PLACES),
             grids: Grids::default(),
             taken: Vec::new(),
             foreseen: Foreseen::new(size),

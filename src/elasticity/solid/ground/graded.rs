@@ -6,7 +6,7 @@ use super::SolidGround;
 use super::solved::{SAFETY, SolidGraded, SolvedModel};
 use crate::budget::{ElementBudget, Watch};
 use crate::elasticity::error::ElasticError;
-use crate::elasticity::estimate::{self, Discretization, ModelSample};
+use crate::elasticity::estimate::{self, AccuracyTarget, Discretization, ModelSample};
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::orders::FIRST;
@@ -75,24 +75,22 @@ impl Grids {
 
 impl SolidGround {
     /// Makes cells smaller until the error under these touches is small enough or the most unknowns are
-    /// spent. `places` (m) are where strains matter.
+    /// spent.
     ///
     /// # Errors
     /// [`ElasticError`] for what cannot be computed.
     pub fn grade(
         &self,
-        touches: &[Touch],
-        places: &[DVec3],
-        aim: &ElementBudget,
+        target: &AccuracyTarget,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
         if let Some(first) = self.own_at(FIRST) {
-            return self.raise(first, touches, places, aim, watch);
+            return self.raise(first, target, watch);
         }
-        let shape = self.measures();
-        let least = shape.least(aim, touches.len());
-        let touches = sample(touches);
-        let places: Vec<DVec3> = subsample(places, PLACES);
+        let (shape, aim) = (self.measures(), target.aim);
+        let least = shape.least(aim, target.count);
+        let touches = sample(target.touches);
+        let places: Vec<DVec3> = subsample(target.places, PLACES);
         let (tip, away) = self.nearest(&touches);
         let mut grids = Grids::default();
         let mut size = shape.first(tip, away, least);

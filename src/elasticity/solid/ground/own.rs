@@ -5,9 +5,9 @@ use glam::DVec3;
 use super::SolidGround;
 use super::foreseen::{Foreseen, is_quick};
 use super::solved::{SAFETY, SolidGraded, SolvedModel};
-use crate::budget::{ElementBudget, Watch};
+use crate::budget::Watch;
 use crate::elasticity::error::ElasticError;
-use crate::elasticity::estimate::{self, Discretization};
+use crate::elasticity::estimate::{self, AccuracyTarget, Discretization};
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::model::Model as _;
@@ -118,12 +118,11 @@ impl SolidGround {
     fn affordable(
         &self,
         order: usize,
-        touches: usize,
-        aim: &ElementBudget,
+        target: &AccuracyTarget,
         beside: f64,
     ) -> Option<(Fineness, OrderedTetrahedra)> {
         let own = self.own_at(order);
-        own.filter(|own| affords(Some(own), touches, aim, beside))
+        own.filter(|own| affords(Some(own), target, beside))
     }
 
     fn solve_own(
@@ -158,15 +157,13 @@ impl SolidGround {
     pub(super) fn raise(
         &self,
         first: (Fineness, OrderedTetrahedra),
-        touches: &[Touch],
-        places: &[DVec3],
-        aim: &ElementBudget,
+        target: &AccuracyTarget,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
-        let mut climb = Climb::new(touches, places);
+        let (mut climb, aim) = (Climb::new(target.touches, target.places), target.aim);
         let given = self.solve_own(first, &climb, watch)?;
         let second = self.own_at(FIRST + 1);
-        let affordable = affords(second.as_ref(), touches.len(), aim, 0.0);
+        let affordable = affords(second.as_ref(), target, 0.0);
         let Some(mut last) = self.try_own(second, &climb, watch)? else {
             let estimate = self.by_pieces(&climb, watch)?;
             return Ok(given.graded(&climb.touches, estimate, 1));
@@ -180,7 +177,7 @@ impl SolidGround {
         while climb.left(false).excess(aim) > SAFETY {
             let order = last.fineness.order;
             let beside = last.model.system().bytes();
-            let next = self.affordable(order + 1, touches.len(), aim, beside);
+            let next = self.affordable(order + 1, target, beside);
             if next.is_none() {
                 break;
             }
@@ -210,26 +207,23 @@ impl SolidGround {
         Some(foreseen)
     }
 
-    /// What [`Self::raise`] would come to for `count` touches like these, from the first two orders, those that are
-    /// quick, and the pattern of the others.
+    /// What [`Self::raise`] would come to for as many touches like these as the target counts, from the first two orders,
+    /// those that are quick, and the pattern of the others.
     ///
     /// # Errors
     /// [`ElasticError`] for what cannot be computed.
     pub(super) fn foresee_raised(
         &self,
         first: (Fineness, OrderedTetrahedra),
-        touches: &[Touch],
-        places: &[DVec3],
-        count: usize,
-        aim: &ElementBudget,
+        target: &AccuracyTarget,
         watch: Watch,
     ) -> Result<Foreseen, ElasticError> {
-        let mut climb = Climb::new(touches, places);
+        let (mut climb, aim) = (Climb::new(target.touches, target.places), target.aim);
         let mut foreseen = Foreseen::new(self.immersed.own().map_or(0.0, VolumeMesh::mean_edge));
         foreseen.raise(FIRST, &first.1);
         let given = self.solve_own(first, &climb, watch)?;
         let second = self.own_at(FIRST + 1);
-        let affordable = affords(second.as_ref(), count, aim, 0.0);
+        let affordable = affords(second.as_ref(), target, 0.0);
         let mut cubic = foreseen;
         if let Some((_, elements)) = &second {
             cubic.raise(FIRST + 1, elements);
@@ -250,7 +244,7 @@ impl SolidGround {
         foreseen.estimate = climb.left(false);
         let mut last = Some(solved);
         while foreseen.estimate.excess(aim) > SAFETY
-            && let Some(next) = self.affordable(foreseen.order + 1, count, aim, foreseen.bytes)
+            && let Some(next) = self.affordable(foreseen.order + 1, target, foreseen.bytes)
         {
             let order = foreseen.order;
             foreseen.raise(order + 1, &next.1);
@@ -324,14 +318,13 @@ impl SolidGround {
 /// Whether a factor fits into memory, of which so much is taken (bytes), and its solutions into the effort.
 fn affords(
     own: Option<&(Fineness, OrderedTetrahedra)>,
-    touches: usize,
-    aim: &ElementBudget,
+    target: &AccuracyTarget,
     taken: f64,
 ) -> bool {
     let plan = own.and_then(|(_, elements)| elements.plan());
     plan.is_some_and(|plan| {
-        let effort = aim.effort as f64;
-        plan.entries * touches as f64 <= ENTRIES * effort
+        let effort = target.aim.effort as f64;
+        plan.entries * target.count as f64 <= ENTRIES * effort
             && plan.multiplications <= MULTIPLICATIONS * effort
             && taken + plan.bytes() <= memory::allowed()
     })
