@@ -16,6 +16,8 @@ pub mod npy;
 pub mod npz;
 pub mod opening;
 pub mod outlet;
+#[cfg(feature = "parquet")]
+pub mod parquet_table;
 pub mod points;
 pub mod project_file;
 pub mod report;

@@ -9,6 +9,7 @@ mod file;
 mod front;
 mod points;
 mod script;
+mod service;
 mod sobol;
 
 pub use self::axis::{StudyAxis, Subject};
@@ -17,6 +18,7 @@ pub use self::file::{Combine, ParameterStudy, StudyBase};
 pub use self::front::{Aim, Bound, front};
 pub use self::points::{MOST_UNITS, Points};
 pub use self::script::{Engine, JobScript, UnitLimits};
+pub use self::service::ServiceLoad;
 
 /// Parses a study's text and checks what can be known without its base.
 ///

@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use super::layout::{check_shape, size};
 use super::{DesignError, Inputs, LAYOUT, Meshed};
-use crate::budget::{Cancelled, ElementBudget, Watch};
+use crate::budget::{Cancelled, Watch};
+use crate::elasticity::Model;
 use crate::elasticity::estimate::{AccuracyTarget, Discretization};
 use crate::elasticity::grade::{self, Graded};
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::model::LoadCheck;
 use crate::elasticity::shell::check_section;
 use crate::elasticity::solid::ground::SolidGround;
-use crate::elasticity::{Model, Touch};
 use crate::feasible::SiteSurroundings;
 use crate::mesh::walls::WallSide;
 use crate::mesh::winding::Winding;

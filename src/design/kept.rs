@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::ground::{Ground, ground};
 use super::layout::lay_out_sites;
-use super::simulate::{Checks, JudgedElements, SignalReader};
+use super::simulate::{Checks, JudgedElements, SiteReader};
 use super::{DesignError, Inputs, Meshed, Simulated};
 use crate::budget::{Budget, Watch, Work};
 use crate::dataset::Dataset;
@@ -88,7 +88,7 @@ pub fn simulate_kept(
         work: Work::default(),
     };
     let read = (kept.dataset, kept.unknowns);
-    let reader = SignalReader {
+    let reader = SiteReader {
         inputs,
         budget,
         places: &places,

@@ -172,7 +172,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
             ..Work::default()
         },
     };
-    let reader = SignalReader {
+    let reader = SiteReader {
         inputs,
         budget,
         places: &places,
@@ -241,7 +241,7 @@ pub fn simulate_again(
     };
     let model = last.meshed.model(watch)?;
     let touches = last.dataset.touches.clone();
-    let reader = SignalReader {
+    let reader = SiteReader {
         inputs,
         budget,
         places: &places,
@@ -263,7 +263,7 @@ pub(super) struct JudgedElements {
 }
 
 /// Reads what sites at some places report.
-pub(super) struct SignalReader<'a> {
+pub(super) struct SiteReader<'a> {
     pub inputs: &'a Inputs,
     pub budget: &'a Budget,
     /// Where sites are (m).
@@ -271,7 +271,7 @@ pub(super) struct SignalReader<'a> {
     pub watch: Watch<'a>,
 }
 
-impl SignalReader<'_> {
+impl SiteReader<'_> {
     /// What the sites report of touches on a model, with everything that its reader must know.
     fn read(
         &self,

@@ -289,7 +289,9 @@ fn strain_apart(
     };
     let far: Vec<Vec<usize>> = touches.iter().map(far).collect();
     let largest = |(load, far): (usize, &Vec<usize>)| {
-        let strains = far.iter().map(|&i| norm(fine.strains[load][i]));
+        let strains = far
+            .iter()
+            .map(|&i| largest_principal(fine.strains[load][i]));
         strains.fold(0.0, f64::max)
     };
     let largest: Vec<f64> = far.iter().enumerate().map(largest).collect();
@@ -301,7 +303,7 @@ fn strain_apart(
             continue;
         }
         for &i in far {
-            sum += (norm(off(load, i)) / strained).powi(2);
+            sum += (largest_principal(off(load, i)) / strained).powi(2);
             count += 1;
         }
     }
@@ -323,7 +325,7 @@ fn readings_apart(
         let far = |touch: &Touch| places[i].distance(touch.position) > BEYOND * touch.tip_radius;
         let loads = (0..touches.len()).filter(|&load| far(&touches[load]));
         let (left, own) = loads.fold((0.0, 0.0), |(left, own), load| {
-            let square = |strain| norm(strain).powi(2);
+            let square = |strain| largest_principal(strain).powi(2);
             (
                 left + square(off(load, i)),
                 own + square(fine.strains[load][i]),
@@ -334,8 +336,9 @@ fn readings_apart(
     median((0..places.len()).filter_map(share)).unwrap_or(f64::NAN)
 }
 
-/// Largest principal strain in size.
-fn norm([xx, yy, xy]: [f64; 3]) -> f64 {
+/// Largest principal strain in size, of strains (xx, yy, 2xy).
+#[must_use]
+pub fn largest_principal([xx, yy, xy]: [f64; 3]) -> f64 {
     f64::midpoint(xx, yy).abs() + ((xx - yy) / 2.0).hypot(xy / 2.0)
 }
 

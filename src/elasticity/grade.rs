@@ -12,7 +12,7 @@ use super::recover::facet_errors;
 use super::shell::check_held;
 use super::support::{DofSet, HeldPart, Support, geometry};
 use super::{ElasticError, Model as _, ShellModel, ShellSection, scope};
-use crate::budget::{ElementBudget, Watch, report};
+use crate::budget::{Watch, report};
 use crate::mesh::TriMesh;
 use crate::mesh::canonical::Canonical;
 use crate::mesh::locate::SurfaceIndex;

@@ -1,8 +1,12 @@
 //! What a study says of each design: numbers with names.
 
+use glam::DVec3;
+
+use super::file::ParameterStudy;
+use super::service::under_service;
 use crate::design::{Design, DesignError, Inputs};
-use crate::elasticity::Touch;
 use crate::elasticity::respond::gives_way;
+use crate::elasticity::{Model, Touch};
 use crate::placement::SensorSet;
 use crate::project::PartModel;
 use crate::regression::folds::evenly;
@@ -14,14 +18,14 @@ pub type Figure = (String, Option<f64>);
 /// Touches that say how stiff a part is.
 const PRESSED: usize = 64;
 
-/// The figures of a design of a part of some density (g/cm³). Errors are means over unseen touches, in mm.
+/// The figures that a study has of a design. Errors are means over unseen touches, in mm.
 ///
 /// # Errors
 /// [`DesignError`] where the model cannot be built again.
 pub fn figures(
     inputs: &Inputs,
     design: &Design,
-    density_g_cm3: f64,
+    study: &ParameterStudy,
 ) -> Result<Vec<Figure>, DesignError> {
     let set = design.chosen_set();
     let mut all = vec![
@@ -34,9 +38,13 @@ pub fn figures(
     ];
     all.extend(errors(design));
     all.extend(lost(design));
-    all.extend(mechanics(inputs, design)?);
+    let model = design.simulated.model()?;
+    all.extend(mechanics(inputs, design, &*model));
+    let sites = &design.simulated.dataset.sites;
+    let places: Vec<DVec3> = sites.iter().map(|s| s.gauge.position).collect();
+    all.extend(under_service(&*model, &study.service, &places)?);
     let cm3 = units::cm3(volume(inputs));
-    all.push(("mass_g".into(), Some(density_g_cm3 * cm3)));
+    all.push(("mass_g".into(), Some(study.base.density_g_cm3 * cm3)));
     Ok(all)
 }
 
@@ -76,12 +84,11 @@ fn lost(design: &Design) -> Vec<Figure> {
 
 /// How far the part gives way under the force of its touches, in the mean and at most, and the largest strain at any
 /// site.
-fn mechanics(inputs: &Inputs, design: &Design) -> Result<Vec<Figure>, DesignError> {
+fn mechanics(inputs: &Inputs, design: &Design, model: &dyn Model) -> Vec<Figure> {
     let dataset = &design.simulated.dataset;
-    let model = design.simulated.model()?;
     let sample = evenly(dataset.touches.len(), PRESSED);
     let touches: Vec<Touch> = sample.iter().map(|&t| dataset.touches[t]).collect();
-    let gives = gives_way(&*model, &touches);
+    let gives = gives_way(model, &touches);
     let mean = gives.iter().sum::<f64>() / gives.len().max(1) as f64;
     let most = gives.iter().copied().fold(0.0, f64::max);
     let force = inputs.project.touch.force_n;
@@ -90,7 +97,7 @@ fn mechanics(inputs: &Inputs, design: &Design) -> Result<Vec<Figure>, DesignErro
         .iter()
         .map(|s| s.rms_strain)
         .fold(0.0, f64::max);
-    Ok(vec![
+    vec![
         ("gives_way_mm".into(), Some(units::mm(mean))),
         ("gives_way_most_mm".into(), Some(units::mm(most))),
         (
@@ -101,7 +108,7 @@ fn mechanics(inputs: &Inputs, design: &Design) -> Result<Vec<Figure>, DesignErro
             "largest_rms_microstrain".into(),
             Some(units::microstrain(strain)),
         ),
-    ])
+    ]
 }
 
 /// Of a solid what its surface encloses, of a shell its middle surface times its wall.

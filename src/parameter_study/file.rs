@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axis::StudyAxis;
 use super::front::Aim;
+use super::service::ServiceLoad;
 use crate::budget::Quality;
 
 /// Version of the file's format.
@@ -27,6 +28,9 @@ pub struct ParameterStudy {
     /// Along what.
     #[serde(default, rename = "axis")]
     pub axes: Vec<StudyAxis>,
+    /// What the part carries in use.
+    #[serde(default)]
+    pub service: Vec<ServiceLoad>,
     /// What is wanted of it.
     #[serde(default)]
     pub aim: Aim,
@@ -111,6 +115,9 @@ impl ParameterStudy {
         }
         if !(1e-3..=30.0).contains(&self.base.density_g_cm3) {
             return Err("density_g_cm3 is between 0.001 and 30".into());
+        }
+        for load in &self.service {
+            load.check()?;
         }
         for (k, axis) in self.axes.iter().enumerate() {
             axis.check()?;

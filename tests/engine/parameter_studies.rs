@@ -54,6 +54,10 @@ values = [1.5, 2.0]
 [[axis]]
 key = "selection.sensors"
 values = [3, 4, 0]
+[[service]]
+at_mm = [0, 30, 80]
+radius_mm = 8
+force_n = [0, -30, -40]
 [aim]
 minimize = ["mass_g", "as_built_10n_mm"]
 [[aim.require]]
@@ -117,6 +121,7 @@ fn units_have_the_same_bytes_whoever_computes_them() {
     for name in [
         "results.csv",
         "results.json",
+        "results.parquet",
         "study.html",
         "results/000004.json",
     ] {
@@ -128,6 +133,19 @@ fn units_have_the_same_bytes_whoever_computes_them() {
     let rows: Vec<&str> = table.lines().collect();
     assert!(rows[0].starts_with("unit,part.thickness_mm,selection.sensors,state,gauges,"));
     assert!(rows[2].starts_with("1,1.5,4,done,4,"), "{}", rows[2]);
+    // A thicker wall carries the load with less.
+    let column = |row: &str, name: &str| -> f64 {
+        let at = rows[0].split(',').position(|n| n == name).unwrap();
+        row.split(',').nth(at).unwrap().parse().unwrap()
+    };
+    for name in [
+        "service_gives_way_mm",
+        "service_moves_most_mm",
+        "service_microstrain",
+    ] {
+        let [thin, thick] = [rows[2], rows[5]].map(|row| column(row, name));
+        assert!(thick > 0.0 && thick < 0.9 * thin, "{name}: {thin} {thick}");
+    }
     assert!(rows[3].starts_with("2,1.5,0,failed,"), "{}", rows[3]);
     assert!(rows[3].contains("selection.sensors must be"), "{}", rows[3]);
     assert!(!table.contains("second"));
@@ -286,6 +304,7 @@ fn what_cannot_be_meant_is_refused_by_its_name() {
         ("part.thickness_mm", "support.kind", "stands in a list"),
         ("limb.hapdef.toml", "other.toml", "other.toml"),
         ("minimize", "minimise", "minimise"),
+        ("radius_mm = 8", "radius_mm = 0", "radius_mm"),
         (
             "values = [1.5, 2.0]",
             "from = 1.0\nto = 2.0",

@@ -9,6 +9,8 @@ use serde_json::{Value, json};
 use crate::budget::unwatched;
 use crate::cli::out;
 use crate::io::atomic;
+#[cfg(feature = "parquet")]
+use crate::io::parquet_table::{ParquetColumn, parquet_table};
 use crate::io::scatter::{Dot, scatter};
 use crate::io::study_folder::{StudyFolder, in_a_cell};
 use crate::io::svg::escape;
@@ -16,6 +18,8 @@ use crate::io::table::Writing;
 use crate::io::together::Together;
 use crate::plain as words;
 use crate::varied::CollectedUnits;
+#[cfg(feature = "parquet")]
+use crate::varied::UnitRow;
 
 #[derive(Args, Debug, Clone)]
 pub struct StudyCollectArgs {
@@ -35,11 +39,15 @@ pub(super) fn run(args: &StudyCollectArgs) -> anyhow::Result<()> {
     let folder = &collected.folder;
     let together = Together::claim(&args.folder)?;
     let costs = costs_csv(folder);
+    #[cfg(feature = "parquet")]
+    let columns = parquet_table(&columns(&collected)).map_err(anyhow::Error::msg)?;
     together.replace(|into| {
         let write = |name: &str, text: &str| atomic::write(&into.join(name), text.as_bytes());
         write("results.csv", &csv(&collected))?;
         write("results.json", &json(&collected).to_string())?;
         write("study.html", &page(&collected))?;
+        #[cfg(feature = "parquet")]
+        atomic::write(&into.join("results.parquet"), &columns)?;
         write("costs.csv", &costs)
     })?;
     let [done, failed, missing] = collected.counts();
@@ -60,7 +68,11 @@ pub(super) fn run(args: &StudyCollectArgs) -> anyhow::Result<()> {
             collected.in_words(unit)
         ))?;
     }
-    for name in ["results.csv", "results.json", "costs.csv", "study.html"] {
+    let mut written = vec!["results.csv", "results.json", "costs.csv", "study.html"];
+    if cfg!(feature = "parquet") {
+        written.insert(2, "results.parquet");
+    }
+    for name in written {
         out::say(&format!("wrote {}", args.folder.join(name).display()));
     }
     Ok(())
@@ -100,6 +112,46 @@ fn csv(collected: &CollectedUnits) -> String {
         table.row(cells.chain([u8::from(row.on_front).to_string(), error]));
     }
     table.text()
+}
+
+/// The columns of `results.csv`, each of one kind: whole numbers, numbers, yes or no, or text.
+#[cfg(feature = "parquet")]
+fn columns(collected: &CollectedUnits) -> Vec<(String, ParquetColumn)> {
+    let rows = &collected.rows;
+    let text = |of: &dyn Fn(&UnitRow) -> Option<String>| {
+        ParquetColumn::Texts(rows.iter().map(of).collect())
+    };
+    let units = (0..rows.len() as i64).map(Some).collect();
+    let mut columns = vec![("unit".to_owned(), ParquetColumn::Integers(units))];
+    for (k, key) in collected.keys().enumerate() {
+        let values: Vec<&Value> = rows.iter().map(|row| &row.values[k]).collect();
+        columns.push((key.to_owned(), of_axis(&values)));
+    }
+    let state = text(&|row| Some(row.state().to_owned()));
+    columns.push(("state".to_owned(), state));
+    for name in &collected.names {
+        let figures = rows.iter().map(|row| row.figures.get(name).copied());
+        columns.push((name.clone(), ParquetColumn::Numbers(figures.collect())));
+    }
+    let front = rows.iter().map(|row| Some(row.on_front)).collect();
+    columns.push(("front".to_owned(), ParquetColumn::Flags(front)));
+    let error = text(&|row| row.outcome.as_ref().and_then(|o| o.error.clone()));
+    columns.push(("error".to_owned(), error));
+    columns
+}
+
+/// Values of an axis, as what all of them are.
+#[cfg(feature = "parquet")]
+fn of_axis(values: &[&Value]) -> ParquetColumn {
+    if values.iter().all(|v| v.is_i64()) {
+        ParquetColumn::Integers(values.iter().map(|v| v.as_i64()).collect())
+    } else if values.iter().all(|v| v.is_number()) {
+        ParquetColumn::Numbers(values.iter().map(|v| v.as_f64()).collect())
+    } else if values.iter().all(|v| v.is_boolean()) {
+        ParquetColumn::Flags(values.iter().map(|v| v.as_bool()).collect())
+    } else {
+        ParquetColumn::Texts(values.iter().map(|v| Some(in_a_cell(v))).collect())
+    }
 }
 
 fn json(collected: &CollectedUnits) -> Value {

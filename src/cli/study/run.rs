@@ -10,6 +10,7 @@ use std::time::Instant;
 use anyhow::{Context as _, ensure};
 use clap::Args;
 
+use super::shared::StudyUnit;
 use super::unit::Workbench;
 use crate::cli::out;
 use crate::cli::ranges::whole;
@@ -201,7 +202,14 @@ impl<'a> Crew<'a> {
             if from >= until {
                 return Ok(());
             }
-            for &unit in &self.wanted[from..until] {
+            for at in from..until {
+                let unit = self.wanted[at];
+                let of_study = StudyUnit {
+                    folder: self.folder,
+                    points: &points,
+                    unit,
+                    ahead: &self.wanted[at + 1..until],
+                };
                 if self.stop.load(Ordering::Relaxed) {
                     return Ok(());
                 }
@@ -212,8 +220,7 @@ impl<'a> Crew<'a> {
                         ControlFlow::Continue(())
                     }
                 };
-                let found =
-                    pool.install(|| bench.compute((self.folder, &points), unit, beside, &watch));
+                let found = pool.install(|| bench.compute(of_study, beside, &watch));
                 let (outcome, cost) = match found {
                     // Another worker has failed, and has said why.
                     Err(_) if self.stop.load(Ordering::Relaxed) => return Ok(()),

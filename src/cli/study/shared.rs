@@ -58,6 +58,16 @@ impl SimulationKey {
     }
 }
 
+/// A unit of a study.
+#[derive(Clone, Copy)]
+pub struct StudyUnit<'a> {
+    pub folder: &'a StudyFolder,
+    pub points: &'a Points<'a>,
+    pub unit: usize,
+    /// Those that are computed on the same bench next: nothing is left in the folder for them.
+    pub ahead: &'a [usize],
+}
+
 /// The last simulation, and who else of a study needs it.
 #[derive(Default)]
 pub(super) struct SharedSimulations {
@@ -79,7 +89,7 @@ impl SharedSimulations {
     /// As [`design::simulate`].
     pub fn simulated(
         &mut self,
-        (folder, points, unit): (&StudyFolder, &Points, usize),
+        at: StudyUnit,
         (inputs, key): (&Inputs, SimulationKey),
         watch: Watch,
     ) -> Result<(Arc<Simulated>, bool), DesignError> {
@@ -87,7 +97,9 @@ impl SharedSimulations {
             return Ok((Arc::clone(&last.simulated), true));
         }
         self.last = None;
-        let others = others(&folder.study, points, unit);
+        let folder = at.folder;
+        let mut others = others(&folder.study, at.points, at.unit);
+        others.retain(|other| !at.ahead.contains(other));
         let path = kept_simulation::path_in(&folder.shared(), &key.name());
         let budget = inputs.project.budget.budget();
         let kept = if others.is_empty() {

@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use serde_json::Map;
 
-use super::shared::{SharedSimulations, SimulationKey};
+use super::shared::{SharedSimulations, SimulationKey, StudyUnit};
 use crate::budget::Watch;
 use crate::design::{self, DesignError, DesignRequest};
 use crate::io::cpu_seconds;
 use crate::io::project_file::LoadedProject;
 use crate::io::study_folder::{StudyFolder, UnitCost, UnitOutcome, plain};
-use crate::parameter_study::{Figure, ParameterStudy, Points, figures};
+use crate::parameter_study::{Figure, ParameterStudy, figures};
 use crate::varied::UnitBase;
 
 /// What units are made on: the base, and simulations that several of them need.
@@ -38,16 +38,15 @@ impl Workbench {
     /// What is not the unit's own fault: a base that cannot be read any more, too little memory, a stop.
     pub fn compute(
         &mut self,
-        (folder, points): (&StudyFolder, &Points),
-        unit: usize,
+        at: StudyUnit,
         beside: usize,
         watch: Watch,
     ) -> anyhow::Result<(UnitOutcome, UnitCost)> {
         let (cpu, start) = (cpu_seconds(), Instant::now());
-        let study = &folder.study;
-        let values = points.values(unit);
+        let (study, unit) = (&at.folder.study, at.unit);
+        let values = at.points.values(unit);
         let named = study.axes.iter().zip(&values);
-        let plan = &folder.plan;
+        let plan = &at.folder.plan;
         let mut outcome = UnitOutcome {
             version: plan.version.clone(),
             study: plan.study.clone(),
@@ -64,7 +63,7 @@ impl Workbench {
         match self.base.project(study, &values) {
             Err(error) if self.base.is_gone() => return Err(error),
             Err(error) => outcome.error = Some(self.base.without_home(&format!("{error:#}"))),
-            Ok(loaded) => match self.designed(loaded, (folder, points, unit), watch, &mut shared) {
+            Ok(loaded) => match self.designed(loaded, at, watch, &mut shared) {
                 Ok((figures, cautions)) => {
                     (outcome.figures, outcome.cautions) = (figures, cautions);
                 }
@@ -90,7 +89,7 @@ impl Workbench {
     fn designed(
         &mut self,
         loaded: LoadedProject,
-        unit: (&StudyFolder, &Points, usize),
+        at: StudyUnit,
         watch: Watch,
         shared: &mut bool,
     ) -> Result<(Vec<Figure>, Vec<String>), DesignError> {
@@ -99,7 +98,7 @@ impl Workbench {
         let budget = inputs.project.budget.budget();
         let made_from = (&inputs, SimulationKey::of(loaded));
         design::check_required(&inputs)?;
-        let simulated = (self.shared).simulated(unit, made_from, watch)?;
+        let simulated = (self.shared).simulated(at, made_from, watch)?;
         *shared = simulated.1;
         let begun = Instant::now();
         let clock = || begun.elapsed().as_secs_f64();
@@ -109,7 +108,7 @@ impl Workbench {
             budget: &budget,
         };
         let design = design::run_from(&asked, simulated.0, &clock, watch)?;
-        let found = figures(&inputs, &design, unit.0.study.base.density_g_cm3)?;
+        let found = figures(&inputs, &design, &at.folder.study)?;
         Ok((found, design.cautions()))
     }
 }
