@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::file::ParameterStudy;
-use super::service::under_service;
+use super::service::ServiceResponse;
 use crate::design::{Design, DesignError, Inputs};
 use crate::elasticity::respond::gives_way;
 use crate::elasticity::{Model, Touch};
@@ -42,7 +42,8 @@ pub fn figures(
     all.extend(mechanics(inputs, design, &*model));
     let sites = &design.simulated.dataset.sites;
     let places: Vec<DVec3> = sites.iter().map(|s| s.gauge.position).collect();
-    all.extend(under_service(&*model, &study.service, &places)?);
+    let response = ServiceResponse::of(&*model, &study.service, &places)?;
+    all.extend(response.iter().flat_map(in_service));
     let cm3 = units::cm3(volume(inputs));
     all.push(("mass_g".into(), Some(study.base.density_g_cm3 * cm3)));
     Ok(all)
@@ -107,6 +108,24 @@ fn mechanics(inputs: &Inputs, design: &Design, model: &dyn Model) -> Vec<Figure>
         (
             "largest_rms_microstrain".into(),
             Some(units::microstrain(strain)),
+        ),
+    ]
+}
+
+/// What the part does under its service load.
+fn in_service(response: &ServiceResponse) -> [Figure; 4] {
+    let gives_way = units::mm(response.gives_way);
+    let stiffness = (gives_way > 0.0).then_some(response.force / gives_way);
+    [
+        ("service_gives_way_mm".into(), Some(gives_way)),
+        ("service_stiffness_n_mm".into(), stiffness),
+        (
+            "service_moves_most_mm".into(),
+            Some(units::mm(response.moves_most)),
+        ),
+        (
+            "service_microstrain".into(),
+            Some(units::microstrain(response.strain)),
         ),
     ]
 }

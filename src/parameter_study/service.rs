@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::figures::Figure;
 use crate::budget::{Cancelled, unwatched};
 use crate::elasticity::estimate::largest_principal;
 use crate::elasticity::observe::Face;
@@ -61,47 +60,51 @@ impl ServiceLoad {
     }
 }
 
-/// What a part does under all loads together: how far these go along their forces (the mean over the forces) and what that
-/// makes of stiffness, how far the vertex goes that goes farthest, and the largest principal strain at any of the
-/// places (m), on the inside. Nothing where there is no load.
-///
-/// # Errors
-/// [`Cancelled`]: never, as nobody watches.
-pub(super) fn under_service(
-    model: &dyn Model,
-    loads: &[ServiceLoad],
-    places: &[DVec3],
-) -> Result<Vec<Figure>, Cancelled> {
-    if loads.is_empty() {
-        return Ok(Vec::new());
+/// What a part does under all loads of a study together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ServiceResponse {
+    /// How far the loads go along their forces, the mean over the forces (m).
+    pub gives_way: f64,
+    /// All forces (N).
+    pub force: f64,
+    /// How far the vertex goes that goes farthest (m).
+    pub moves_most: f64,
+    /// The largest principal strain at any of the places.
+    pub strain: f64,
+}
+
+impl ServiceResponse {
+    /// Of a model, its strains at some places (m) on the inside; nothing where there is no load.
+    ///
+    /// # Errors
+    /// [`Cancelled`]: never, as nobody watches.
+    pub fn of(
+        model: &dyn Model,
+        loads: &[ServiceLoad],
+        places: &[DVec3],
+    ) -> Result<Option<Self>, Cancelled> {
+        if loads.is_empty() {
+            return Ok(None);
+        }
+        let pushes: Vec<Push> = loads.iter().map(|load| load.push(model)).collect();
+        let force: f64 = pushes.iter().map(|push| push.touch.force).sum();
+        let UnderForces { work, vertices } = under_forces(model, &pushes);
+        Ok(Some(Self {
+            gives_way: work / force,
+            force,
+            moves_most: vertices.iter().map(|u| u.length()).fold(0.0, f64::max),
+            strain: largest_strain(model, &pushes, places)?,
+        }))
     }
-    let pushes: Vec<Push> = loads.iter().map(|load| load.push(model)).collect();
-    let force: f64 = pushes.iter().map(|push| push.touch.force).sum();
-    let Moved { work, vertices } = moved(model, &pushes);
-    let along = work / force;
-    let most = vertices.iter().map(|u| u.length()).fold(0.0, f64::max);
-    let strain = largest_strain(model, &pushes, places)?;
-    Ok(vec![
-        ("service_gives_way_mm".into(), Some(units::mm(along))),
-        (
-            "service_stiffness_n_mm".into(),
-            (along > 0.0).then_some(force / units::mm(along)),
-        ),
-        ("service_moves_most_mm".into(), Some(units::mm(most))),
-        (
-            "service_microstrain".into(),
-            Some(units::microstrain(strain)),
-        ),
-    ])
 }
 
 /// What forces do to a part: forces times displacements (N m), and how every vertex moves (m).
-struct Moved {
+struct UnderForces {
     work: f64,
     vertices: Vec<DVec3>,
 }
 
-fn moved(model: &dyn Model, pushes: &[Push]) -> Moved {
+fn under_forces(model: &dyn Model, pushes: &[Push]) -> UnderForces {
     // Where pads overlap, the forces on a degree of freedom are one.
     let mut forces = BTreeMap::new();
     for (dof, force) in pushes.iter().flat_map(|push| model.push(push)) {
@@ -111,12 +114,12 @@ fn moved(model: &dyn Model, pushes: &[Push]) -> Moved {
     let system = model.system();
     let solution = system.solve_dofs(&forces);
     let solved = system.widened(&[&solution]);
-    let mut own = Moved {
+    let mut own = UnderForces {
         work: forces.iter().map(|&(dof, f)| f * solution[dof]).sum(),
         vertices: model.translations(&solved, 1).swap_remove(0),
     };
     if let Some(coarser) = model.coarser() {
-        let coarse = moved(coarser.model, pushes);
+        let coarse = under_forces(coarser.model, pushes);
         own.work = coarser.carried(own.work, coarse.work);
         for (fine, coarse) in own.vertices.iter_mut().zip(coarse.vertices) {
             *fine += coarser.share * (*fine - coarse);
@@ -202,12 +205,11 @@ mod tests {
         }
     }
 
-    fn said(model: &ShellModel, loads: &[ServiceLoad]) -> Vec<f64> {
+    fn said(model: &ShellModel, loads: &[ServiceLoad]) -> ServiceResponse {
         let places: Vec<DVec3> = (1..60)
             .map(|k| DVec3::new(LENGTH * f64::from(k) / 60.0, WIDTH / 2.0, 0.0))
             .collect();
-        let figures = under_service(model, loads, &places).unwrap();
-        figures.into_iter().map(|(_, v)| v.unwrap()).collect()
+        ServiceResponse::of(model, loads, &places).unwrap().unwrap()
     }
 
     #[test]
@@ -220,8 +222,12 @@ mod tests {
         let end = gives + force * arm * arm / (2.0 * bending) * (LENGTH - arm);
         // At the place nearest to the clamp.
         let strain = force * (arm - LENGTH / 60.0) * THICKNESS / 2.0 / bending;
-        let beam = [1e3 * gives, force / (1e3 * gives), 1e3 * end, 1e6 * strain];
-        for (found, beam) in found.iter().zip(beam) {
+        for (found, beam) in [
+            (found.gives_way, gives),
+            (found.force, force),
+            (found.moves_most, end),
+            (found.strain, strain),
+        ] {
             assert!((found / beam - 1.0).abs() < 0.02, "{found} {beam}");
         }
     }
@@ -230,14 +236,14 @@ mod tests {
     fn loads_act_together() {
         let model = cantilever();
         let one = said(&model, &[load(90.0, [0.0, 0.1, -0.4])]);
-        let halves = [load(90.0, [0.0, 0.1, 0.0]), load(90.0, [0.0, 0.0, -0.4])];
-        let both = said(&model, &halves);
-        for k in [2, 3] {
-            assert!((both[k] / one[k] - 1.0).abs() < 1e-9, "{one:?} {both:?}");
+        let parts = [load(90.0, [0.0, 0.1, 0.0]), load(90.0, [0.0, 0.0, -0.4])];
+        let both = said(&model, &parts);
+        for ratio in [both.moves_most / one.moves_most, both.strain / one.strain] {
+            assert!((ratio - 1.0).abs() < 1e-9, "{one:?} {both:?}");
         }
         let against = [load(90.0, [0.0, 0.0, -0.4]), load(90.0, [0.0, 0.0, 0.4])];
-        assert!(said(&model, &against)[2] < 1e-9 * one[2]);
-        assert!(under_service(&model, &[], &[]).unwrap().is_empty());
+        assert!(said(&model, &against).moves_most < 1e-9 * one.moves_most);
+        assert_eq!(ServiceResponse::of(&model, &[], &[]).unwrap(), None);
     }
 
     #[test]

@@ -30,7 +30,7 @@ pub fn side(
         let _ = write!(words, ", {failed} failed");
     }
     if missing > 0 {
-        let _ = write!(words, ", {missing} are missing");
+        let _ = write!(words, ", {missing} missing");
     }
     ui.add(egui::Label::new(RichText::new(words).strong()).wrap());
     if let Some(unit) = view.looked_at() {
