@@ -9,8 +9,9 @@ use std::collections::BinaryHeap;
 
 /// Units of a task, as `hapdef study submit` makes them of a grid whose last axis has five values.
 const TOGETHER: usize = 5;
-/// What the engine takes to hand out a task (s): `HyperQueue` 0.27 on one machine (RESULTS.md).
-const OVERHEAD_S: f64 = 0.001;
+/// What the engine takes to hand out a task (s): 2000 tasks that do nothing, by `HyperQueue` 0.27 on one machine of two cores, their
+/// processes included.
+const OVERHEAD_S: f64 = 0.002;
 /// Operations of a unit on the study's folder (`strace`: 110 of five units), and how many a file server does in a second: what
 /// one with mechanical disks is good for.
 const OPERATIONS: f64 = 22.0;
