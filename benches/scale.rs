@@ -12,9 +12,9 @@ const TOGETHER: usize = 5;
 /// What the engine takes to hand out a task (s): 2000 tasks that do nothing, by `HyperQueue` 0.27 on one machine of two cores, their
 /// processes included.
 const OVERHEAD_S: f64 = 0.002;
-/// Operations of a unit on the study's folder (`strace`: 110 of five units), and how many a file server does in a second: what
+/// Operations of a unit on the study's folder (`strace`: 94 of five units, 20 of them to have files on the disk), and how many a file server does in a second: what
 /// one with mechanical disks is good for.
-const OPERATIONS: f64 = 22.0;
+const OPERATIONS: f64 = 19.0;
 const A_SECOND: f64 = 2000.0;
 const UNITS: [usize; 2] = [1_000, 100_000];
 const WORKERS: [usize; 3] = [1, 10, 1_000];
