@@ -2,8 +2,8 @@
 //! part is of finer elements than the listener's model is pressed and disturbed (`hapdef board --simulate --record`), and
 //! `hapdef listen` says what it feels.
 //!
-//! The bundled limb at Draft with its ten gauges, or with other ten (`HAPDEF_TEN`); what the gauges are off by is said at
-//! each test.
+//! The bundled limb at Draft with its ten gauges, or with other ten (`HAPDEF_TEN`), or another limb with its own
+//! (`HAPDEF_LIMB`); what the gauges are off by is said at each test.
 
 mod bench;
 
@@ -403,7 +403,6 @@ fn by_hand(seed: u64) {
         "0.5",
     ];
     let recording = all.record(&[&WORKSHOP_BOARD[..], &disturbed].concat());
-    std::fs::copy(all.at("limb.glb"), known.at("limb.glb")).unwrap();
     let (heard, _) = listen(&recording, &found);
     let (felt, (off, held), ghosts) = (all.felt(&heard), all.off(&heard), all.ghosts(&heard, 0.0));
     println!(

@@ -3,9 +3,12 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 
 use glam::DVec3;
+use hapdef::budget::{Quality, unwatched};
 use hapdef::cli;
+use hapdef::design;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -21,19 +24,26 @@ fn other_ten() -> Option<String> {
     std::env::var("HAPDEF_TEN").ok()
 }
 
-/// Holds what the bundled gauges hold; of others it is said where they do not.
-pub fn hold(holds: bool, what: &str) {
-    match other_ten() {
-        Some(ten) if !holds => println!("{ten} does not hold {what}"),
-        Some(_) => {}
-        None => assert!(holds, "{what}"),
-    }
+/// A project with chosen gauges whose limb all rows are tried on in place of the bundled one, in a folder with all that it
+/// names: what `hapdef design` writes.
+fn other_limb() -> Option<PathBuf> {
+    std::env::var_os("HAPDEF_LIMB").map(PathBuf::from)
 }
 
-/// The bundled project, or with other gauges.
+/// Holds what the bundled limb and its gauges hold; of others it is said where they do not.
+pub fn hold(holds: bool, what: &str) {
+    let is_other = other_ten().is_some() || other_limb().is_some();
+    if is_other && !holds {
+        println!("does not hold {what}");
+    }
+    assert!(holds || is_other, "{what}");
+}
+
+/// The project of the limb, or with other gauges.
 fn told(ten: Option<&str>) -> String {
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
-    let bundled = read(PROJECT.as_ref());
+    let limb = other_limb().filter(|_| ten.is_none());
+    let bundled = read(&limb.unwrap_or_else(|| PROJECT.into()));
     let Some(ten) = ten else {
         return bundled;
     };
@@ -137,8 +147,18 @@ impl Bench {
     /// On the gauges of that name.
     pub fn on(ten: Option<&str>, presses: Vec<Press>) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let limb = PathBuf::from(PROJECT).with_file_name("limb.glb");
-        std::fs::copy(limb, folder.path().join("limb.glb")).unwrap();
+        let limb = match other_limb().filter(|_| ten.is_none()) {
+            // It names meshes and masks.
+            Some(project) => std::fs::read_dir(project.parent().unwrap())
+                .unwrap()
+                .map(|entry| entry.unwrap().path())
+                .filter(|path| path.is_file())
+                .collect(),
+            None => vec![PathBuf::from(PROJECT).with_file_name("limb.glb")],
+        };
+        for file in limb {
+            std::fs::copy(&file, folder.path().join(file.file_name().unwrap())).unwrap();
+        }
         let bench = Self {
             told: told(ten),
             folder,
@@ -292,9 +312,39 @@ pub fn listen_with(recording: &Path, project: &Path, more: &[&str]) -> (Vec<Hear
     (lines.lines().map(Heard::of).collect(), said)
 }
 
-/// So many places on the limb's outside (mm), one above another around it, off the held ends.
+/// So many places on the limb's outside (mm), off the held ends.
 pub fn places(count: usize) -> Vec<DVec3> {
-    pub const TRIED: usize = 300;
+    static ALL: OnceLock<Vec<DVec3>> = OnceLock::new();
+    let all = ALL.get_or_init(|| match other_limb() {
+        Some(project) => felt_places(&project),
+        None => places_around(),
+    });
+    (0..count).map(|k| all[k * all.len() / count]).collect()
+}
+
+/// Places that are tried.
+const TRIED: usize = 300;
+
+/// Where the gauges of a project feel a newton ten times above a noise of a microstrain: what they are blind to is the
+/// design's, and not what is tried here.
+fn felt_places(project: &Path) -> Vec<DVec3> {
+    const SEED: u64 = 0x7e57;
+    const FELT: f64 = 10e-6;
+    let inputs = cli::open(project, None).unwrap().inputs;
+    let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+    let touches = sensing.touches(&inputs, TRIED, SEED, true).unwrap();
+    let map = &sensing.drawn.map;
+    let is_felt = |place: &DVec3| {
+        let reading = map.at(map.mesh.index().nearest(*place).0);
+        reading.iter().map(|x| x * x).sum::<f64>().sqrt() >= FELT
+    };
+    let felt: Vec<DVec3> = touches.iter().map(|t| t.position).filter(is_felt).collect();
+    println!("{} of {} places are felt", felt.len(), touches.len());
+    felt.iter().map(|p| *p * 1e3).collect()
+}
+
+/// On the bundled limb, one above another around it.
+fn places_around() -> Vec<DVec3> {
     let part = cli::open(PROJECT.as_ref(), None).unwrap().inputs.part;
     let mesh = part.as_given();
     let on_the_limb = |k: usize| {
@@ -304,8 +354,7 @@ pub fn places(count: usize) -> Vec<DVec3> {
         let place = mesh.point(mesh.index().nearest(around).0);
         (place.distance(around) < 0.5e-3).then_some(place * 1e3)
     };
-    let all: Vec<DVec3> = (0..TRIED).filter_map(on_the_limb).collect();
-    (0..count).map(|k| all[k * all.len() / count]).collect()
+    (0..TRIED).filter_map(on_the_limb).collect()
 }
 
 /// Presses one after another, each everywhere alike.
