@@ -24,8 +24,8 @@ fn other_ten() -> Option<String> {
     std::env::var("HAPDEF_TEN").ok()
 }
 
-/// A project with chosen gauges whose limb all rows are tried on in place of the bundled one, in a folder with all that it
-/// names: what `hapdef design` writes.
+/// A project with chosen gauges whose limb all rows are tried on in place of the bundled one, in a folder of its own: what
+/// `hapdef design` writes.
 fn other_limb() -> Option<PathBuf> {
     std::env::var_os("HAPDEF_LIMB").map(PathBuf::from)
 }
@@ -146,27 +146,24 @@ impl Bench {
 
     /// On the gauges of that name.
     pub fn on(ten: Option<&str>, presses: Vec<Press>) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let limb = match other_limb().filter(|_| ten.is_none()) {
-            // It names meshes and masks.
-            Some(project) => std::fs::read_dir(project.parent().unwrap())
-                .unwrap()
-                .map(|entry| entry.unwrap().path())
-                .filter(|path| path.is_file())
-                .collect(),
-            None => vec![PathBuf::from(PROJECT).with_file_name("limb.glb")],
+        let limb = other_limb().filter(|_| ten.is_none());
+        let folder = match &limb {
+            // Its project names its mesh from there.
+            Some(project) => tempfile::tempdir_in(project.ancestors().nth(2).unwrap()),
+            None => tempfile::tempdir(),
         };
-        for file in limb {
-            std::fs::copy(&file, folder.path().join(file.file_name().unwrap())).unwrap();
-        }
         let bench = Self {
             told: told(ten),
-            folder,
+            folder: folder.unwrap(),
             presses,
             seed: 4,
         };
+        if limb.is_none() {
+            let mesh = PathBuf::from(PROJECT).with_file_name("limb.glb");
+            std::fs::copy(mesh, bench.at("limb.glb")).unwrap();
+        }
         std::fs::write(bench.at("script.csv"), bench.script(0.0)).unwrap();
-        std::fs::write(bench.at("board.hapdef.toml"), &bench.told).unwrap();
+        bench.save("board.hapdef.toml", &bench.told);
         bench
     }
 
@@ -210,8 +207,17 @@ impl Bench {
     pub fn project(&self, keys: &[(&str, &str)]) -> PathBuf {
         let told = self.told.clone();
         let changed = keys.iter().fold(told, |p, (key, to)| with(&p, key, to));
-        let path = self.at("told.hapdef.toml");
-        std::fs::write(&path, changed).unwrap();
+        self.save("told.hapdef.toml", &changed)
+    }
+
+    /// A project, with the arrays that it may name.
+    fn save(&self, name: &str, project: &str) -> PathBuf {
+        let path = self.at(name);
+        std::fs::write(&path, project).unwrap();
+        let arrays = other_limb().map(|limb| limb.with_extension("npz"));
+        if let Some(arrays) = arrays.filter(|arrays| arrays.exists()) {
+            std::fs::copy(arrays, path.with_extension("npz")).unwrap();
+        }
         path
     }
 
