@@ -371,13 +371,22 @@ impl SimulatedBoard {
     }
 }
 
-/// A gain (of the amplifier) with which most touches of a force at these places stay within the range.
+/// What a gain is to suit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HardestUse {
+    /// The hardest touch (N).
+    pub force: f64,
+    /// How far channels are off beside touches (strain).
+    pub off: f64,
+}
+
+/// A gain (of the amplifier) with which most touches at these places stay within the range, as hard as they may be.
 #[must_use]
 pub fn fitting_gain(
     sensitivity: &Sensitivity,
     gains: &[f64],
     touches: &[Touch],
-    most_force: f64,
+    hardest: HardestUse,
     chain: &Chain,
 ) -> f64 {
     /// Of the touches, and of half the range.
@@ -385,7 +394,7 @@ pub fn fitting_gain(
     const FILLED: f64 = 0.8;
     let largest = |t: &Touch| {
         let read = sensitivity.read(&Touch {
-            force: most_force,
+            force: hardest.force,
             ..*t
         });
         read.iter()
@@ -398,12 +407,13 @@ pub fn fitting_gain(
         .get((strains.len() as f64 * MOST) as usize)
         .copied()
         .unwrap_or(1e-3);
-    let half_range = FILLED * f64::from(chain.highest_count()) / 2.0;
+    let half_range = f64::from(chain.highest_count()) / 2.0;
+    let needed = (strain.max(1e-6) / FILLED).max(strain + hardest.off);
     let unit = Chain {
         gain: 1.0,
         ..*chain
     };
-    (half_range / (strain.max(1e-6) * unit.counts_per_strain()))
+    (half_range / (needed * unit.counts_per_strain()))
         .clamp(1.0, 5000.0)
         .round()
 }

@@ -14,6 +14,7 @@ pub mod pipeline;
 mod presses;
 pub mod receiver;
 mod release;
+mod standing;
 pub mod tare;
 mod tremble;
 mod update;

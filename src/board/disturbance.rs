@@ -25,6 +25,19 @@ pub struct Disturbances {
     pub crosstalk: f64,
 }
 
+impl Disturbances {
+    /// How far channels are off by them at most (strain) in so many seconds.
+    #[must_use]
+    pub fn most(&self, seconds: f64) -> f64 {
+        /// Of what is drawn.
+        const DEVIATIONS: f64 = 3.0;
+        let wandered = self.wander.map_or(0.0, |(deviation, _)| deviation);
+        let hum = self.hum.map_or(0.0, |(amplitude, _)| amplitude);
+        let apart = self.warming_apart * seconds;
+        hum + self.warming.abs() * seconds + DEVIATIONS * (wandered + apart)
+    }
+}
+
 /// The same over time.
 #[derive(Clone, Debug)]
 pub(super) struct Disturbed {

@@ -21,7 +21,7 @@ use crate::board::{
     BoardOptions, GivenPress, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
 };
 use crate::budget::Watch;
-use crate::design::simulated_board::{BoardRequest, options, places, simulated};
+use crate::design::simulated_board::{BoardRequest, LASTS_S, options, places, simulated};
 use crate::design::{self, Inputs};
 use crate::inference::Chain;
 use crate::link::{Doorway, Entrance, Recorder, check_length, host, ports, record};
@@ -203,7 +203,11 @@ fn build(
             script_seed(seed),
         ),
     };
-    let hardest = strongest(&script).unwrap_or(args.force[1]);
+    let lasts_s = plan.presses.as_deref().and_then(end_of).or(args.seconds);
+    let hardest = (
+        strongest(&script).unwrap_or(args.force[1]),
+        lasts_s.unwrap_or(LASTS_S),
+    );
     let usual = options(inputs, plan.channels);
     let options = BoardOptions {
         rate_hz: args.rate,

@@ -6,7 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use super::presses::{self, Press};
 use super::{DesignError, Inputs, PRESS_SEED, Sensing, Workshop};
 use crate::as_made::as_made;
-use crate::board::{BoardOptions, Disturbances, Faults, PressScript, SimulatedBoard, fitting_gain};
+use crate::board::{
+    BoardOptions, Disturbances, Faults, HardestUse, PressScript, SimulatedBoard, fitting_gain,
+};
 use crate::budget::Watch;
 use crate::draw::normal;
 use crate::elasticity::respond;
@@ -53,14 +55,17 @@ pub fn places(inputs: &Inputs, sensing: &Sensing, seed: u64) -> Result<Vec<Touch
     sensing.touches(inputs, PLACES, seed.wrapping_add(SEED), false)
 }
 
+/// How long a board goes on whose end nobody has said, as far as its gain is to suit what drifts (s).
+pub const LASTS_S: f64 = 600.0;
+
 /// A simulated board as it is asked for.
 pub struct BoardRequest {
     /// How its gauges are glued.
     pub workshop: Workshop,
     /// Who presses, and where.
     pub script: PressScript,
-    /// The hardest touch (N) that its gain is to suit; absent where the gain of the options stays.
-    pub hardest: Option<f64>,
+    /// The hardest touch (N) that its gain is to suit, and how long (s) it is to; absent where the gain of the options stays.
+    pub hardest: Option<(f64, f64)>,
     /// What it is like.
     pub options: BoardOptions,
     /// What goes wrong on the wire.
@@ -91,8 +96,10 @@ pub fn simulated(
         .into_iter()
         .take(300)
         .collect();
-    if let Some(most_force) = hardest {
-        options.chain.gain = fitting_gain(&reference, &gains, &typical, most_force, &options.chain);
+    if let Some((force, seconds)) = hardest {
+        let off = options.disturbances.most(seconds);
+        let hardest = HardestUse { force, off };
+        options.chain.gain = fitting_gain(&reference, &gains, &typical, hardest, &options.chain);
     }
     Ok(SimulatedBoard::new(
         reference, gains, script, options, faults,

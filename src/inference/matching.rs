@@ -208,15 +208,15 @@ impl Matching {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::inference::Deviations;
     use crate::mesh::TriMesh;
 
-    pub(super) const CHANNELS: usize = 4;
+    pub(crate) const CHANNELS: usize = 4;
 
     /// What some gauges read on one triangle, and what gluing spreads there: about a microstrain a newton.
-    pub(super) fn maps() -> [Arc<ResponseMap>; 2] {
+    pub(crate) fn maps() -> [Arc<ResponseMap>; 2] {
         let corners = [DVec3::ZERO, DVec3::X * 0.01, DVec3::Y * 0.01];
         let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
         let mesh = Arc::new(mesh);

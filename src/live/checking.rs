@@ -21,6 +21,10 @@ const COMES_OVER: f64 = 0.02;
 const NONE: f64 = 0.2;
 const CLEAR: f64 = 0.1;
 const ABOVE_NOISE: f64 = 15.0;
+/// A channel whose mean is so many deviations of its noise from an end of the range is cut off there now and then, and reads too
+/// little; no more than a share of the range, where the noise is large.
+const NEAR_END: f64 = 3.0;
+const NEAR_END_MOST: f64 = 0.02;
 /// Deviation of what a dead gauge reads, over its noise: its rest may have moved a little.
 const AT_REST: f64 = 4.0;
 
@@ -123,11 +127,13 @@ impl Checking {
         // Before there is a rest, nobody knows what is noisy.
         let usual = self.usual.unwrap_or(f64::INFINITY);
         for (k, (watcher, &count)) in self.watchers.iter_mut().zip(counts).enumerate() {
+            let own_noise = noise.map_or(0.0, |n| n[k]);
+            let near = |h: f64| (NEAR_END * own_noise).min(NEAR_END_MOST * h);
             let expected = ExpectedSignal {
                 // Of plain lines nobody knows the range.
-                lowest: highest.map_or(f64::NEG_INFINITY, |_| 1.0),
-                highest: highest.map_or(f64::INFINITY, |h| h - 1.0),
-                own_noise: noise.map_or(0.0, |n| n[k]),
+                lowest: highest.map_or(f64::NEG_INFINITY, |h| 1.0 + near(h)),
+                highest: highest.map_or(f64::INFINITY, |h| h - 1.0 - near(h)),
+                own_noise,
                 usual_noise: usual,
                 rate,
             };

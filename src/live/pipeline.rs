@@ -285,7 +285,9 @@ impl Pipeline {
         // What is hardly felt is not strange because nothing was found in it.
         let passed_s = if self.feeling.clearly() { step_s } else { 0.0 };
         self.feeling.found(is_found, passed_s);
-        if self.release.is_sure(self.proved) {
+        let may_be_off = self.feeling.touching && !self.proved;
+        let stands = may_be_off && self.release.stands(&mut self.matching, &strain, step_s);
+        if stands || self.release.is_sure(self.proved) {
             self.tare();
             self.news = Some(RestNews::Released);
             return nothing;
@@ -460,7 +462,7 @@ impl Pipeline {
         let found = self.matching.find(strain);
         let at = (time_us, strain);
         let several = &self.counting.several;
-        if (self.release).is_seen(&mut self.matching, several, at, &found) {
+        if (self.release).is_seen(&mut self.matching, several, at, &found, self.proved) {
             return None;
         }
         self.search = Some((strain.to_vec(), found));

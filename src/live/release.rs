@@ -2,15 +2,18 @@
 //! touch then, but for their sign, and nothing pulls at a limb. Two touches may read much like a pull at a third place:
 //! they are held against it.
 
+use super::standing::Standing;
 use crate::inference::{Contact, Matching, Several};
 use crate::units;
 
 /// Of what a pull explains, twice the logarithm of the likelihood: more than that of noise.
 const CLEAR: f64 = 100.0;
 /// A pull leaves no more than this share of it unexplained, and a touch at least so much more: nobody believes in pulls
-/// as long as a touch will do.
+/// as long as a touch will do. Of a rest to which nobody has come back so far it takes less: a touch that is missed once is
+/// no harm beside one that is shown for ever.
 const EXPLAINED: f64 = 0.25;
 const WORSE: f64 = 40.0;
+const WORSE_AT_FIRST: f64 = 20.0;
 /// Looks in a row that make it sure, and seconds: of a rest to which nobody has come back so far none; but where a touch has
 /// come and gone it is rather a gauge that says nothing.
 const LOOKS: u32 = 3;
@@ -26,27 +29,36 @@ pub struct Release {
     seen: [u64; 2],
     /// When it was asked whether several touches would do (µs), and whether a pull was likelier.
     asked: Option<(u64, bool)>,
+    standing: Standing,
 }
 
 impl Release {
+    /// Whether what is felt is rather a rest that is off than a touch that stands, of a reading (strain) some seconds after
+    /// the one before.
+    pub fn stands(&mut self, matching: &mut Matching, strain: &[f64], step_s: f64) -> bool {
+        self.standing.is_rather_the_rest(matching, strain, step_s)
+    }
+
     /// Whether a reading (strain, at a time in µs) is rather of something that lets go than of the touch that explains it
-    /// best, or of several.
+    /// best, or of several, where the rest was proved or not.
     pub fn is_seen(
         &mut self,
         matching: &mut Matching,
         several: &Several,
         (time_us, strain): (u64, &[f64]),
         touch: &Contact,
+        proved: bool,
     ) -> bool {
+        let worse = if proved { WORSE } else { WORSE_AT_FIRST };
         // A pull would have to leave less than nothing.
-        if touch.unexplained < WORSE {
+        if touch.unexplained < worse {
             self.looks = 0;
             return false;
         }
         let turned: Vec<f64> = strain.iter().map(|x| -x).collect();
         let pull = matching.find(&turned);
         let explained = pull.unexplained < EXPLAINED * pull.strength;
-        let better = pull.strength > CLEAR && touch.strength < pull.strength - WORSE;
+        let better = pull.strength > CLEAR && touch.strength < pull.strength - worse;
         let seen = explained && better && {
             let lately = |at: u64| units::seconds_between(at, time_us) < ASK_S;
             // That it is a pull is asked until it is believed, at every sample.
@@ -81,7 +93,7 @@ impl Release {
 
     /// Begins anew.
     pub fn forget(&mut self) {
-        (self.looks, self.asked) = (0, None);
+        *self = Self::default();
     }
 }
 
@@ -95,7 +107,7 @@ mod tests {
         let seen = |looks: u32, ms: u64| Release {
             looks,
             seen: [5_000, 5_000 + 1000 * ms],
-            asked: None,
+            ..Release::default()
         };
         assert!(!seen(LOOKS - 1, 5000).is_sure(false));
         assert!(seen(LOOKS, 2).is_sure(false));

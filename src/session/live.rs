@@ -25,7 +25,7 @@ use super::state::live::Target;
 use crate::board::{
     ChannelFault, Faults, Illness, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
 };
-use crate::design::simulated_board::{BoardRequest, options, places, simulated};
+use crate::design::simulated_board::{BoardRequest, LASTS_S, options, places, simulated};
 use crate::design::{Inputs, Sensing, Workshop};
 use crate::document::SensingInputs;
 use crate::io::kept_model;
@@ -309,7 +309,7 @@ fn board(inputs: &Inputs, sensing: &Sensing, r: &Reporter) -> Result<SimulatedBo
     let asked = BoardRequest {
         workshop: Workshop::All,
         script,
-        hardest: Some(FORCES_N[1]),
+        hardest: Some((FORCES_N[1], LASTS_S)),
         options: options(inputs, sensing.gauges.len()),
         faults: Faults::default(),
     };

@@ -8,7 +8,7 @@ use crate::bench::{Collector, CollectorNews, ContactLaw, PrinterFaults, RunEnd, 
 use crate::board::{BoardOptions, Faults, PressScript, SimulatedBoard};
 use crate::budget::Watch;
 use crate::design::DesignError;
-use crate::design::simulated_board::{BoardRequest, gives_way, options, simulated};
+use crate::design::simulated_board::{BoardRequest, LASTS_S, gives_way, options, simulated};
 use crate::elasticity::Touch;
 use crate::link::{BenchOrder, press_simulated};
 
@@ -72,7 +72,7 @@ fn built(
     let asked = BoardRequest {
         workshop: flaws.workshop,
         script: PressScript::Held(None, 0),
-        hardest: Some(ready.asked.most_force_n),
+        hardest: Some((ready.asked.most_force_n, LASTS_S)),
         options,
         faults: Faults::default(),
     };

@@ -216,7 +216,7 @@ impl Bench {
         let asked = board::BoardRequest {
             workshop: Workshop::Exact,
             script,
-            hardest: Some(10.0),
+            hardest: Some((10.0, board::LASTS_S)),
             options,
             faults,
         };

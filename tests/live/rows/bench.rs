@@ -26,7 +26,7 @@ fn other_ten() -> Option<String> {
 
 /// A project with chosen gauges whose limb all rows are tried on in place of the bundled one, in a folder of its own: what
 /// `hapdef design` writes.
-fn other_limb() -> Option<PathBuf> {
+pub fn other_limb() -> Option<PathBuf> {
     std::env::var_os("HAPDEF_LIMB").map(PathBuf::from)
 }
 
