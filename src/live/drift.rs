@@ -21,7 +21,7 @@ use super::feeling::BEGINS;
 use crate::inference::{SeveralTouches, TouchKind};
 
 use self::creep::Creep;
-use self::misfit::Misfit;
+use self::misfit::{EstimatedTouch, Misfit};
 use self::walk::RestWalk;
 
 /// Seconds that samples are gathered for before the rest is corrected by their mean.
@@ -216,44 +216,81 @@ impl Drift {
         })
     }
 
-    /// A sample under a touch: what that reads, and what is left of the sample beside it (strain since the tare), with the
-    /// ways in which it may be another touch (columns of J, strain). Whether more is known of the rest now.
+    /// A sample (strain since the tare) under a touch, and what that reads of it, with the ways in which it may be another touch
+    /// (columns of J, strain). Whether more is known of the rest now.
     pub fn touched(
         &mut self,
         touches: &SeveralTouches,
-        [reading, left]: [&[f64]; 2],
+        [strain, reading]: [&[f64]; 2],
         noise: &[f64],
         used: &[bool],
-        ways: impl FnOnce() -> Vec<Vec<f64>>,
+        ways: impl Fn() -> Vec<Vec<f64>>,
     ) -> bool {
         if !std::mem::replace(&mut self.under_touch, true) {
             self.interrupted(noise, used);
         }
-        let Some((mut mean, samples)) = self.gather(left) else {
+        let left = strain.iter().zip(reading).map(|(x, r)| x - r);
+        let both: Vec<f64> = left.chain(strain.iter().copied()).collect();
+        let Some((mut mean, samples)) = self.gather(&both) else {
             return false;
         };
         self.go_on_to(self.now_s, Some(reading));
-        for (x, rest) in mean.iter_mut().zip(self.walk.rest(0.0)) {
+        let rest: Vec<f64> = self.walk.rest(0.0).collect();
+        for (x, rest) in mean.iter_mut().zip(rest.iter().chain(&rest)) {
             *x -= rest;
         }
-        let beyond = match &touches.contacts[..] {
-            [touch] if touch.narrow => {
-                let is_area = matches!(touches.kind, TouchKind::Area(_));
-                let touch = (touch.position, touch.force, is_area);
-                (self.misfit).beyond(touch, &mean, ways)
-            }
-            _ => Some((mean, misfit::doubt_of(reading), ways())),
+        let read = mean.split_off(rest.len());
+        let measured = |doubt: &[f64]| -> Vec<f64> {
+            let noise = noise.iter().zip(doubt);
+            noise.map(|(n, d)| n * n / samples + d).collect()
         };
-        if let Some((off, doubt, ways)) = beyond {
-            let noise = noise.iter().zip(&doubt);
-            let variance: Vec<f64> = noise.map(|(n, d)| n * n / samples + d).collect();
-            let off = (&off[..], SUDDEN);
-            if self.walk.correct(off, &variance, used, &ways).is_none() {
-                self.misfit.forget();
+        let corrected = match &touches.contacts[..] {
+            [touch] if touch.narrow => {
+                let touch = EstimatedTouch {
+                    place: touch.position,
+                    force: touch.force,
+                    is_area: matches!(touches.kind, TouchKind::Area(_)),
+                    left: &mean,
+                    read: &read,
+                };
+                self.correct_under(touch, measured, used, ways)
             }
+            _ => {
+                let variance = measured(&misfit::doubt_of(reading));
+                let off = (&mean[..], SUDDEN);
+                self.walk.correct(off, &variance, used, &ways()).is_some()
+            }
+        };
+        if !corrected {
+            self.misfit.forget();
         }
         self.weigh(noise, used);
         true
+    }
+
+    /// Corrects the rest under one touch, by what is likelier: that it stands still, or that it moves as it is estimated to.
+    /// Whether it explains what is read.
+    fn correct_under(
+        &mut self,
+        touch: EstimatedTouch<'_>,
+        measured: impl Fn(&[f64]) -> Vec<f64>,
+        used: &[bool],
+        ways: impl Fn() -> Vec<Vec<f64>>,
+    ) -> bool {
+        let Some(beyond) = self.misfit.beyond(touch, &ways) else {
+            return true;
+        };
+        let variance = measured(&beyond.doubt);
+        let either = [&beyond.standing[..], &beyond.moving[..]];
+        let which = (self.walk).likeliest(&either, &variance, used, &beyond.ways);
+        if which > 0 && !beyond.stays {
+            self.misfit.came(touch, ways());
+            return true;
+        }
+        let off = (either[which], SUDDEN);
+        (self.walk)
+            .correct(off, &variance, used, &beyond.ways)
+            .is_some()
     }
 
     /// Something comes: of a rest that was too short to be believed, what was read well before says what there is to
@@ -277,7 +314,7 @@ impl Drift {
     /// The mean of a block, when it is full.
     fn gather(&mut self, values: &[f64]) -> Option<(Vec<f64>, f64)> {
         if self.samples == 0.0 {
-            self.gathered.fill(0.0);
+            self.gathered = vec![0.0; values.len()];
         }
         self.samples += 1.0;
         for (sum, value) in self.gathered.iter_mut().zip(values) {

@@ -159,9 +159,8 @@ impl KnownRest {
         let more = match under {
             Under::Touches(touches) => {
                 let reading = matching.reading_of_all(touches);
-                let left: Vec<f64> = raw.iter().zip(&reading).map(|(x, r)| x - r).collect();
                 let ways = || matching.leeway_of_all(touches);
-                drift.touched(touches, [&reading, &left], &self.noise, used, ways)
+                drift.touched(touches, [raw, &reading], &self.noise, used, ways)
             }
             Under::Nothing { at_rest } => {
                 if *at_rest {

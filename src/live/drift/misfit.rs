@@ -23,52 +23,79 @@ struct FoundTouch {
     force: f64,
     is_area: bool,
     left: Vec<f64>,
+    read: Vec<f64>,
     /// The ways in which it may be another one, and with them those of the touch that it was before.
     own: Vec<Vec<f64>>,
     ways: Vec<Vec<f64>>,
 }
 
-/// What has come to what a touch leaves (strain), how far that is in doubt (strain², a channel), and the ways in which the
-/// touch may be another one (strain).
-type Beyond = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>);
+/// What may have come to the rest since a touch came to where it is.
+pub(super) struct Beyond {
+    /// Where it stands still: what is read is another than then by this (strain), but for the ways in which the touch may be
+    /// another one.
+    pub standing: Vec<f64>,
+    /// Where it moves: what it leaves is another by this (strain).
+    pub moving: Vec<f64>,
+    /// How far that is in doubt (strain², a channel).
+    pub doubt: Vec<f64>,
+    /// The ways in which the touch may be another one (strain).
+    pub ways: Vec<Vec<f64>>,
+    /// Whether it is estimated to be where it was.
+    pub stays: bool,
+}
+
+/// A touch as it is estimated (m, N), and what it leaves of what is read (strain, both since the rest).
+#[derive(Clone, Copy)]
+pub(super) struct EstimatedTouch<'a> {
+    pub place: DVec3,
+    pub force: f64,
+    pub is_area: bool,
+    pub left: &'a [f64],
+    pub read: &'a [f64],
+}
 
 impl Misfit {
-    /// What has come to what is left (strain) of a touch (m, N, whether it is an area) since it came to where it is; nothing
-    /// while it comes.
+    /// What has come to what is read and left since a touch came to where it is; nothing while it comes.
     ///
     /// The ways in which it may be another one are those of when it came: taken anew as its estimate wanders, they would
     /// together leave no direction free, and the filter would be sure of what nobody has seen (first-estimate Jacobians:
-    /// G. P. Huang, A. I. Mourikis and S. I. Roumeliotis, Int. J. Robotics Research 29, 2010).
+    /// G. P. Huang, A. I. Mourikis and S. I. Roumeliotis, Int. J. Robotics Research 29, 2010). For the same reason a touch may
+    /// stand still whatever its estimate does: that wanders with what is wrong with the rest, and what it then leaves would be
+    /// taken for more of the same.
     pub fn beyond(
         &mut self,
-        (place, force, is_area): (DVec3, f64, bool),
-        left: &[f64],
+        touch: EstimatedTouch<'_>,
         ways: impl FnOnce() -> Vec<Vec<f64>>,
     ) -> Option<Beyond> {
-        let stays = |f: &&FoundTouch| {
-            f.is_area == is_area && f.place.distance(place) < STAYS && force < HARDER * f.force
-        };
-        let Some(found) = self.found.as_ref().filter(stays) else {
-            let own = ways();
-            // What a drift puts into a touch makes it another one little by little: the ways of the one before stay free.
-            let before = self.found.take().map_or_else(Vec::new, |before| before.own);
-            self.found = Some(FoundTouch {
-                place,
-                force,
-                is_area,
-                left: left.to_vec(),
-                ways: [own.clone(), before].concat(),
-                own,
-            });
+        let Some(found) = self.found.as_ref().filter(|f| f.is_area == touch.is_area) else {
+            self.came(touch, ways());
             return None;
         };
-        let share = force / found.force;
+        let share = touch.force / found.force;
         let was = || found.left.iter().map(|w| share * w);
-        Some((
-            left.iter().zip(was()).map(|(x, w)| x - w).collect(),
-            was().map(doubt).collect(),
-            found.ways.clone(),
-        ))
+        let since = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(x, w)| x - w).collect();
+        Some(Beyond {
+            standing: since(touch.read, &found.read),
+            moving: touch.left.iter().zip(was()).map(|(x, w)| x - w).collect(),
+            doubt: was().map(doubt).collect(),
+            ways: found.ways.clone(),
+            stays: found.place.distance(touch.place) < STAYS && touch.force < HARDER * found.force,
+        })
+    }
+
+    /// A touch has come to where it is, with the ways in which it may be another one.
+    pub fn came(&mut self, touch: EstimatedTouch<'_>, own: Vec<Vec<f64>>) {
+        // What a drift puts into a touch makes it another one little by little: the ways of the one before stay free.
+        let before = self.found.take().map_or_else(Vec::new, |before| before.own);
+        self.found = Some(FoundTouch {
+            place: touch.place,
+            force: touch.force,
+            is_area: touch.is_area,
+            left: touch.left.to_vec(),
+            read: touch.read.to_vec(),
+            ways: [own.clone(), before].concat(),
+            own,
+        });
     }
 
     /// The touch is over.

@@ -20,7 +20,7 @@
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::steps::Steps;
 use crate::statistics::{mean, median};
@@ -227,6 +227,42 @@ impl RestWalk {
         &by * self.later(seconds, hidden) * by.transpose()
     }
 
+    /// What readings without a touch are expected to be off from the rest by, where they have these variances (strain²) and
+    /// the touch may be another one in some ways; nothing where rounding has left no covariance.
+    fn innovation(&self, variance: &[f64], used: &[bool], ways: &[Vec<f64>]) -> Option<Innovation> {
+        let trusted: Vec<usize> = (0..used.len()).filter(|&k| used[k]).collect();
+        let by = self.jacobian();
+        let seen = by.select_rows(&trusted) * &self.covariance;
+        let mut inner = &seen * by.select_rows(&trusted).transpose();
+        inner += DMatrix::from_diagonal(&among(variance, &trusted));
+        for way in ways {
+            let way = among(way, &trusted);
+            inner.ger(1.0, &way, &way, 1.0);
+        }
+        Some(Innovation {
+            factor: inner.cholesky()?,
+            trusted,
+            seen,
+        })
+    }
+
+    /// Which of some readings that are off from the rest without a touch is the likeliest.
+    pub fn likeliest(
+        &self,
+        all: &[&[f64]],
+        variance: &[f64],
+        used: &[bool],
+        ways: &[Vec<f64>],
+    ) -> usize {
+        let Some(expected) = self.innovation(variance, used, ways) else {
+            return 0;
+        };
+        let squares: Vec<f64> = all.iter().map(|off| expected.squares(off)).collect();
+        (0..all.len())
+            .min_by(|&a, &b| squares[a].total_cmp(&squares[b]))
+            .unwrap_or(0)
+    }
+
     /// Corrects the rest by what readings are off from it without a touch, with their variances (strain, strain²) and the
     /// ways in which the touch may be another one. By how much b is another then (strain); nothing where the readings are
     /// farther off than so many standard deviations of χ².
@@ -237,29 +273,17 @@ impl RestWalk {
         used: &[bool],
         ways: &[Vec<f64>],
     ) -> Option<Vec<f64>> {
-        let trusted: Vec<usize> = (0..off.len()).filter(|&k| used[k]).collect();
-        let of_trusted = |values: &[f64]| {
-            DVector::from_iterator(trusted.len(), trusted.iter().map(|&c| values[c]))
-        };
-        let by = self.jacobian();
-        // What is read depends on the state, trusted × (2 n + 2).
-        let seen = by.select_rows(&trusted) * &self.covariance;
-        let mut inner = &seen * by.select_rows(&trusted).transpose();
-        inner += DMatrix::from_diagonal(&of_trusted(variance));
-        for way in ways {
-            let way = of_trusted(way);
-            inner.ger(1.0, &way, &way, 1.0);
-        }
-        let Some(factor) = inner.cholesky() else {
+        let Some(expected) = self.innovation(variance, used, ways) else {
             // Rounding has made it none: what a tare knows is known again.
             (self.covariance, self.uneven) = (self.start.clone(), UNEVEN * UNEVEN);
             return None;
         };
-        let off = of_trusted(off);
-        let count = trusted.len() as f64;
-        if off.dot(&factor.solve(&off)) > count + most * (2.0 * count).sqrt() {
+        let count = expected.trusted.len() as f64;
+        if expected.squares(off) > count + most * (2.0 * count).sqrt() {
             return None;
         }
+        let off = among(off, &expected.trusted);
+        let Innovation { factor, seen, .. } = expected;
         let gain = factor.solve(&seen);
         let correction = gain.tr_mul(&off);
         if correction.iter().any(|c| !c.is_finite()) {
@@ -381,6 +405,27 @@ impl RestWalk {
         let uneven = tried.iter().map(|t| t[0] * likely(t)).sum::<f64>() / sum;
         Some((uneven, count))
     }
+}
+
+/// How far readings are expected to be off: the channels that are trusted, what is read of the state (trusted × (2 n + 2)),
+/// and the covariance of it all.
+struct Innovation {
+    trusted: Vec<usize>,
+    seen: DMatrix<f64>,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Innovation {
+    /// Weighted squares of what readings are off by (strain): as χ².
+    fn squares(&self, off: &[f64]) -> f64 {
+        let off = among(off, &self.trusted);
+        off.dot(&self.factor.solve(&off))
+    }
+}
+
+/// The values of some of the channels.
+fn among(values: &[f64], channels: &[usize]) -> DVector<f64> {
+    DVector::from_iterator(channels.len(), channels.iter().map(|&c| values[c]))
 }
 
 /// Makes the factors of all channels uncertain by so much more (variance), and not their mean.
