@@ -45,6 +45,10 @@ const CREEPS: f64 = 0.1e-6;
 /// rest that has moved: that goes slowly.
 const SUDDEN: f64 = 8.0;
 
+/// Weighted squares by which it has to be likelier that a touch moves than that it stands: its estimate goes a little way with
+/// the noise, and seems so.
+const MOVES: f64 = 10.0;
+
 /// Of the variance that a touch leaves of the rest: what it hid is not to be taken for another touch.
 const CAUTION: f64 = 16.0;
 
@@ -268,7 +272,7 @@ impl Drift {
         true
     }
 
-    /// Corrects the rest under one touch, by what is likelier: that it stands still, or that it moves as it is estimated to.
+    /// Corrects the rest under one touch that stands still or, where that is clearly likelier, moves as it is estimated to.
     /// Whether it explains what is read.
     fn correct_under(
         &mut self,
@@ -281,13 +285,14 @@ impl Drift {
             return true;
         };
         let variance = measured(&beyond.doubt);
-        let either = [&beyond.standing[..], &beyond.moving[..]];
-        let which = (self.walk).likeliest(&either, &variance, used, &beyond.ways);
-        if which > 0 && !beyond.stays {
+        let either = [&beyond.moving[..], &beyond.standing[..]];
+        let moves = (self.walk).likelier_by(either, &variance, used, &beyond.ways) > MOVES;
+        if moves && !beyond.stays {
             self.misfit.came(touch, ways());
             return true;
         }
-        let off = (either[which], SUDDEN);
+        let off = if moves { either[0] } else { either[1] };
+        let off = (off, SUDDEN);
         (self.walk)
             .correct(off, &variance, used, &beyond.ways)
             .is_some()

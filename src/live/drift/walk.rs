@@ -246,21 +246,16 @@ impl RestWalk {
         })
     }
 
-    /// Which of some readings that are off from the rest without a touch is the likeliest.
-    pub fn likeliest(
+    /// By how many weighted squares, as χ², one reading that is off from the rest without a touch is likelier than another.
+    pub fn likelier_by(
         &self,
-        all: &[&[f64]],
+        [off, than]: [&[f64]; 2],
         variance: &[f64],
         used: &[bool],
         ways: &[Vec<f64>],
-    ) -> usize {
-        let Some(expected) = self.innovation(variance, used, ways) else {
-            return 0;
-        };
-        let squares: Vec<f64> = all.iter().map(|off| expected.squares(off)).collect();
-        (0..all.len())
-            .min_by(|&a, &b| squares[a].total_cmp(&squares[b]))
-            .unwrap_or(0)
+    ) -> f64 {
+        let expected = self.innovation(variance, used, ways);
+        expected.map_or(0.0, |e| e.squares(than) - e.squares(off))
     }
 
     /// Corrects the rest by what readings are off from it without a touch, with their variances (strain, strain²) and the
