@@ -95,11 +95,9 @@ mod tests {
     /// Levels (times the reading of a newton at one place), a second each: when it is taken for the rest.
     fn taken(levels: &[f64], is_pull: bool) -> Option<usize> {
         let [map, _] = maps();
-        let reading: Vec<f64> = map
-            .node(1)
-            .iter()
-            .map(|g| if is_pull { -g } else { *g })
-            .collect();
+        let at_one_node = &map.values()[CHANNELS..2 * CHANNELS];
+        let size = if is_pull { -1.0 } else { 1.0 };
+        let reading: Vec<f64> = at_one_node.iter().map(|g| size * g).collect();
         let errors = ReadingErrors::of_noise(1e-7, CHANNELS);
         let mut matching = Matching::new(map, errors, 60.0);
         let mut standing = Standing::default();
