@@ -73,11 +73,9 @@ impl Misfit {
         };
         let share = touch.force / found.force;
         let was = || found.left.iter().map(|w| share * w);
-        // What the model lacks goes with the force, also where nothing moves.
-        let more = found.left.iter().map(|w| (share - 1.0) * w);
-        let then = found.read.iter().zip(more).map(|(read, more)| read + more);
+        let since = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(x, w)| x - w).collect();
         Some(Beyond {
-            standing: touch.read.iter().zip(then).map(|(x, y)| x - y).collect(),
+            standing: since(touch.read, &found.read),
             moving: touch.left.iter().zip(was()).map(|(x, w)| x - w).collect(),
             doubt: was().map(doubt).collect(),
             ways: found.ways.clone(),
