@@ -238,7 +238,10 @@ impl Drift {
         let Some((mut mean, samples)) = self.gather(&both) else {
             return false;
         };
-        self.go_on_to(self.now_s, Some(reading));
+        // As it came: what is loaded is no other because the estimate wanders, and what that is beside the ways in which the touch
+        // may be another one would seem to be seen.
+        let load = self.misfit.reading();
+        self.go_on_to(self.now_s, Some(load.as_deref().unwrap_or(reading)));
         let rest: Vec<f64> = self.walk.rest(0.0).collect();
         for (x, rest) in mean.iter_mut().zip(rest.iter().chain(&rest)) {
             *x -= rest;

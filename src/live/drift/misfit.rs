@@ -87,17 +87,22 @@ impl Misfit {
     pub fn came(&mut self, touch: EstimatedTouch<'_>, own: Vec<Vec<f64>>) {
         // What a drift puts into a touch makes it another one little by little: the ways of the one before stay free.
         let before = self.found.take().map_or_else(Vec::new, |before| before.own);
-        // What the model lacks goes with the force.
-        let harder = touch.left.iter().map(|w| (HARDER - 1.0) * w).collect();
         self.found = Some(FoundTouch {
             place: touch.place,
             force: touch.force,
             is_area: touch.is_area,
             left: touch.left.to_vec(),
             read: touch.read.to_vec(),
-            ways: [own.clone(), before, vec![harder]].concat(),
+            ways: [own.clone(), before].concat(),
             own,
         });
+    }
+
+    /// What the touch read (strain) when it came to where it is, by its estimate.
+    pub fn reading(&self) -> Option<Vec<f64>> {
+        let found = self.found.as_ref()?;
+        let pairs = found.read.iter().zip(&found.left);
+        Some(pairs.map(|(read, left)| read - left).collect())
     }
 
     /// The touch is over.
