@@ -416,7 +416,7 @@ impl Lab {
         let asked = board::BoardRequest {
             workshop: Workshop::All,
             script,
-            hardest: Some(15.0),
+            hardest: Some((15.0, board::LASTS_S)),
             options,
             faults,
         };
