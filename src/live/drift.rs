@@ -240,7 +240,8 @@ impl Drift {
         };
         // As it came: what is loaded is no other because the estimate wanders, and what that is beside the ways in which the touch
         // may be another one would seem to be seen.
-        let load = self.misfit.reading();
+        let hardest = touches.contacts.first();
+        let load = hardest.and_then(|touch| self.misfit.reading(touch.force));
         self.go_on_to(self.now_s, Some(load.as_deref().unwrap_or(reading)));
         let rest: Vec<f64> = self.walk.rest(0.0).collect();
         for (x, rest) in mean.iter_mut().zip(rest.iter().chain(&rest)) {

@@ -98,11 +98,12 @@ impl Misfit {
         });
     }
 
-    /// What the touch read (strain) when it came to where it is, by its estimate.
-    pub fn reading(&self) -> Option<Vec<f64>> {
+    /// What a touch as hard as this (N) reads (strain) where it came to, by its estimate then.
+    pub fn reading(&self, force: f64) -> Option<Vec<f64>> {
         let found = self.found.as_ref()?;
+        let share = force / found.force;
         let pairs = found.read.iter().zip(&found.left);
-        Some(pairs.map(|(read, left)| read - left).collect())
+        Some(pairs.map(|(read, left)| share * (read - left)).collect())
     }
 
     /// The touch is over.
