@@ -291,7 +291,7 @@ impl Drift {
         let variance = measured(&beyond.doubt);
         let either = [&beyond.moving[..], &beyond.standing[..]];
         let moves = (self.walk).likelier_by(either, &variance, used, &beyond.ways) > MOVES;
-        if moves && !beyond.stays {
+        if beyond.harder || (moves && !beyond.stays) {
             self.misfit.came(touch, ways());
             return true;
         }

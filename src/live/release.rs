@@ -2,7 +2,7 @@
 //! touch then, but for their sign, and nothing pulls at a limb. Two touches may read much like a pull at a third place:
 //! they are held against it.
 
-use super::standing::Standing;
+use super::standing::StandingTouch;
 use crate::inference::{Contact, Matching, Several};
 use crate::units;
 
@@ -29,7 +29,7 @@ pub struct Release {
     seen: [u64; 2],
     /// When it was asked whether several touches would do (µs), and whether a pull was likelier.
     asked: Option<(u64, bool)>,
-    standing: Standing,
+    standing: StandingTouch,
 }
 
 impl Release {

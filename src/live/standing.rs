@@ -15,7 +15,7 @@ const NO_WORSE: f64 = 10.0;
 
 /// What is read while others come and go.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Standing {
+pub(super) struct StandingTouch {
     /// The level that others come to (strain).
     level: Option<Vec<f64>>,
     /// Sum of what has been read since it was last another reading, and how long that is.
@@ -27,7 +27,7 @@ pub(super) struct Standing {
     returns: u32,
 }
 
-impl Standing {
+impl StandingTouch {
     /// Takes in a reading (strain) some seconds after the one before. Whether the touch that stands is rather a rest that is
     /// off: others have come and gone and left it just as it was, and one that lets go would read the same.
     pub fn is_rather_the_rest(
@@ -100,7 +100,7 @@ mod tests {
         let reading: Vec<f64> = at_one_node.iter().map(|g| size * g).collect();
         let errors = ReadingErrors::of_noise(1e-7, CHANNELS);
         let mut matching = Matching::new(map, errors, 60.0);
-        let mut standing = Standing::default();
+        let mut standing = StandingTouch::default();
         let mut at = |size: f64| {
             let strain: Vec<f64> = reading.iter().map(|g| size * g).collect();
             standing.is_rather_the_rest(&mut matching, &strain, 0.01)

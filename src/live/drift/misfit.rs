@@ -40,8 +40,9 @@ pub(super) struct Beyond {
     pub doubt: Vec<f64>,
     /// The ways in which the touch may be another one (strain).
     pub ways: Vec<Vec<f64>>,
-    /// Whether it is estimated to be where it was.
+    /// Whether it is estimated to be where it was, and whether it has become harder.
     pub stays: bool,
+    pub harder: bool,
 }
 
 /// A touch as it is estimated (m, N), and what it leaves of what is read (strain, both since the rest).
@@ -79,7 +80,8 @@ impl Misfit {
             moving: touch.left.iter().zip(was()).map(|(x, w)| x - w).collect(),
             doubt: was().map(doubt).collect(),
             ways: found.ways.clone(),
-            stays: found.place.distance(touch.place) < STAYS && touch.force < HARDER * found.force,
+            stays: found.place.distance(touch.place) < STAYS,
+            harder: touch.force >= HARDER * found.force,
         })
     }
 
@@ -87,13 +89,15 @@ impl Misfit {
     pub fn came(&mut self, touch: EstimatedTouch<'_>, own: Vec<Vec<f64>>) {
         // What a drift puts into a touch makes it another one little by little: the ways of the one before stay free.
         let before = self.found.take().map_or_else(Vec::new, |before| before.own);
+        // What the model lacks goes with the force.
+        let harder = touch.left.iter().map(|w| (HARDER - 1.0) * w).collect();
         self.found = Some(FoundTouch {
             place: touch.place,
             force: touch.force,
             is_area: touch.is_area,
             left: touch.left.to_vec(),
             read: touch.read.to_vec(),
-            ways: [own.clone(), before].concat(),
+            ways: [own.clone(), before, vec![harder]].concat(),
             own,
         });
     }
