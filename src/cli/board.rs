@@ -203,7 +203,8 @@ fn build(
             script_seed(seed),
         ),
     };
-    let lasts_s = plan.presses.as_deref().and_then(end_of).or(args.seconds);
+    let scripted = plan.presses.as_deref().and_then(end_of);
+    let lasts_s = args.seconds.or(scripted);
     let hardest = (
         strongest(&script).unwrap_or(args.force[1]),
         lasts_s.unwrap_or(LASTS_S),

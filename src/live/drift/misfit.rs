@@ -104,7 +104,7 @@ impl Misfit {
 
     /// What a touch as hard as this (N) reads (strain) where it came to, by its estimate then.
     pub fn reading(&self, force: f64) -> Option<Vec<f64>> {
-        let found = self.found.as_ref()?;
+        let found = self.found.as_ref().filter(|f| f.force > 0.0)?;
         let share = force / found.force;
         let pairs = found.read.iter().zip(&found.left);
         Some(pairs.map(|(read, left)| share * (read - left)).collect())
