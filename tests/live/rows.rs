@@ -3,7 +3,7 @@
 //! `hapdef listen` says what it feels.
 //!
 //! The bundled limb at Draft with its ten gauges, or with other ten (`HAPDEF_TEN`), or another limb with its own
-//! (`HAPDEF_LIMB`); what the gauges are off by is said at each test.
+//! (`HAPDEF_LIMB`), or a listener of finer elements (`HAPDEF_QUALITY`); what the gauges are off by is said at each test.
 
 mod bench;
 

@@ -30,9 +30,14 @@ pub fn other_limb() -> Option<PathBuf> {
     std::env::var_os("HAPDEF_LIMB").map(PathBuf::from)
 }
 
+/// How finely the listener computes the limb, unless a row says it itself.
+fn quality() -> String {
+    std::env::var("HAPDEF_QUALITY").unwrap_or_else(|_| "draft".into())
+}
+
 /// Holds what the bundled limb and its gauges hold; of others it is said where they do not.
 pub fn hold(holds: bool, what: &str) {
-    let is_other = other_ten().is_some() || other_limb().is_some();
+    let is_other = other_ten().is_some() || other_limb().is_some() || quality() != "draft";
     if is_other && !holds {
         println!("does not hold {what}");
     }
@@ -302,7 +307,7 @@ impl Bench {
 
 /// What is heard of a recording with a project, and what is said beside.
 pub fn listen(recording: &Path, project: &Path) -> (Vec<Heard>, String) {
-    listen_with(recording, project, &["--quality", "draft"])
+    listen_with(recording, project, &["--quality", &quality()])
 }
 
 pub fn listen_with(recording: &Path, project: &Path, more: &[&str]) -> (Vec<Heard>, String) {
