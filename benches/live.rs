@@ -13,7 +13,7 @@ use std::sync::mpsc::channel;
 use std::time::Instant;
 
 use glam::DVec3;
-use hapdef::board::{BoardOptions, Faults, PressScript, RandomPresses};
+use hapdef::board::{BoardOptions, Faults, HardestUse, PressScript, RandomPresses};
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
@@ -416,7 +416,10 @@ impl Lab {
         let asked = board::BoardRequest {
             workshop: Workshop::All,
             script,
-            hardest: Some((15.0, board::LASTS_S)),
+            hardest: Some(HardestUse {
+                force: 15.0,
+                seconds: board::LASTS_S,
+            }),
             options,
             faults,
         };

@@ -4,6 +4,7 @@
 
 mod disturbance;
 mod fault;
+mod gain;
 mod script;
 
 use glam::DVec3;
@@ -21,6 +22,7 @@ use disturbance::Disturbed;
 
 pub use disturbance::Disturbances;
 pub use fault::{ChannelFault, Fault, Faults, Illness};
+pub use gain::{HardestUse, fitting_gain};
 pub use script::{GivenPress, PRESSES, PressScript, RAMP_S, RandomPresses, ScriptedPress, aside};
 
 /// How the board measures.
@@ -369,53 +371,6 @@ impl SimulatedBoard {
         }
         strains
     }
-}
-
-/// What a gain is to suit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HardestUse {
-    /// The hardest touch (N).
-    pub force: f64,
-    /// How far channels are off beside touches (strain).
-    pub off: f64,
-}
-
-/// A gain (of the amplifier) with which most touches at these places stay within the range, as hard as they may be.
-#[must_use]
-pub fn fitting_gain(
-    sensitivity: &Sensitivity,
-    gains: &[f64],
-    touches: &[Touch],
-    hardest: HardestUse,
-    chain: &Chain,
-) -> f64 {
-    /// Of the touches, and of half the range.
-    const MOST: f64 = 0.95;
-    const FILLED: f64 = 0.8;
-    let largest = |t: &Touch| {
-        let read = sensitivity.read(&Touch {
-            force: hardest.force,
-            ..*t
-        });
-        read.iter()
-            .zip(gains)
-            .fold(0.0_f64, |m, (s, g)| m.max((s * g).abs()))
-    };
-    let mut strains: Vec<f64> = touches.iter().map(largest).collect();
-    strains.sort_by(f64::total_cmp);
-    let strain = strains
-        .get((strains.len() as f64 * MOST) as usize)
-        .copied()
-        .unwrap_or(1e-3);
-    let half_range = f64::from(chain.highest_count()) / 2.0;
-    let needed = (strain.max(1e-6) / FILLED).max(strain + hardest.off);
-    let unit = Chain {
-        gain: 1.0,
-        ..*chain
-    };
-    (half_range / (needed * unit.counts_per_strain()))
-        .clamp(1.0, 5000.0)
-        .round()
 }
 
 /// Draws the seed of a simulated board's script from its own.

@@ -12,6 +12,7 @@ mod hum;
 mod news;
 pub mod pipeline;
 mod presses;
+mod pull;
 pub mod receiver;
 mod release;
 mod standing;

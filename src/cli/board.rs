@@ -18,7 +18,8 @@ use self::truth::TruthFile;
 use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::board::{
-    BoardOptions, GivenPress, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
+    BoardOptions, GivenPress, HardestUse, PressScript, RandomPresses, SimulatedBoard, Truth,
+    script_seed,
 };
 use crate::budget::Watch;
 use crate::design::simulated_board::{BoardRequest, LASTS_S, options, places, simulated};
@@ -205,10 +206,10 @@ fn build(
     };
     let scripted = plan.presses.as_deref().and_then(end_of);
     let lasts_s = args.seconds.or(scripted);
-    let hardest = (
-        strongest(&script).unwrap_or(args.force[1]),
-        lasts_s.unwrap_or(LASTS_S),
-    );
+    let hardest = HardestUse {
+        force: strongest(&script).unwrap_or(args.force[1]),
+        seconds: lasts_s.unwrap_or(LASTS_S),
+    };
     let usual = options(inputs, plan.channels);
     let options = BoardOptions {
         rate_hz: args.rate,

@@ -64,8 +64,8 @@ pub struct BoardRequest {
     pub workshop: Workshop,
     /// Who presses, and where.
     pub script: PressScript,
-    /// The hardest touch (N) that its gain is to suit, and how long (s) it is to; absent where the gain of the options stays.
-    pub hardest: Option<(f64, f64)>,
+    /// What its gain is to suit; absent where the gain of the options stays.
+    pub hardest: Option<HardestUse>,
     /// What it is like.
     pub options: BoardOptions,
     /// What goes wrong on the wire.
@@ -96,10 +96,9 @@ pub fn simulated(
         .into_iter()
         .take(300)
         .collect();
-    if let Some((force, seconds)) = hardest {
-        let off = options.disturbances.most(seconds);
-        let hardest = HardestUse { force, off };
-        options.chain.gain = fitting_gain(&reference, &gains, &typical, hardest, &options.chain);
+    if let Some(hardest) = hardest {
+        let measured = (&options.chain, &options.disturbances);
+        options.chain.gain = fitting_gain((&reference, &gains), &typical, hardest, measured);
     }
     Ok(SimulatedBoard::new(
         reference, gains, script, options, faults,

@@ -128,11 +128,10 @@ impl Checking {
         let usual = self.usual.unwrap_or(f64::INFINITY);
         for (k, (watcher, &count)) in self.watchers.iter_mut().zip(counts).enumerate() {
             let own_noise = noise.map_or(0.0, |n| n[k]);
-            let near = |h: f64| (NEAR_END * own_noise).min(NEAR_END_MOST * h);
+            let [lowest, highest] = whole_range(highest, own_noise);
             let expected = ExpectedSignal {
-                // Of plain lines nobody knows the range.
-                lowest: highest.map_or(f64::NEG_INFINITY, |h| 1.0 + near(h)),
-                highest: highest.map_or(f64::INFINITY, |h| h - 1.0 - near(h)),
+                lowest,
+                highest,
                 own_noise,
                 usual_noise: usual,
                 rate,
@@ -210,7 +209,46 @@ impl Checking {
     }
 }
 
+/// Counts between which a channel of some noise is never cut off, of a range up to the highest.
+fn whole_range(highest: Option<f64>, noise: f64) -> [f64; 2] {
+    // Of plain lines nobody knows the range.
+    highest.map_or([f64::NEG_INFINITY, f64::INFINITY], |highest| {
+        let near = 1.0 + (NEAR_END * noise).min(NEAR_END_MOST * highest);
+        [near, highest - near]
+    })
+}
+
 /// Logarithm of the normal density of a value around zero.
 fn log_normal(value: f64, deviation: f64) -> f64 {
     -0.5 * ((value / deviation).powi(2) + (std::f64::consts::TAU * deviation * deviation).ln())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A channel that reads evenly around some counts: whether it is left out.
+    fn is_off_scale(around: f64, highest: Option<f64>) -> bool {
+        let rest = Rest {
+            level: vec![2000.0],
+            noise: vec![5.0],
+            drift: Vec::new(),
+        };
+        let mut checking = Checking::new(1);
+        for k in 0..100 {
+            let count = around + f64::from(k % 3) - 1.0;
+            checking.watch((&[count], Some(&[count])), Some(&rest), 1000.0, highest);
+        }
+        checking.health[0] == Health::OffScale
+    }
+
+    #[test]
+    fn a_channel_is_left_out_before_its_noise_is_cut_off() {
+        for (around, is_out) in [(4085.0, true), (4070.0, false), (10.0, true), (25.0, false)] {
+            assert_eq!(is_off_scale(around, Some(4095.0)), is_out, "{around}");
+        }
+        assert!(!is_off_scale(4085.0, None));
+        // Of one that trembles much most of the range stays.
+        assert_eq!(whole_range(Some(4095.0), 500.0)[0], 1.0 + 0.02 * 4095.0);
+    }
 }

@@ -2,16 +2,15 @@
 //! touch then, but for their sign, and nothing pulls at a limb. Two touches may read much like a pull at a third place:
 //! they are held against it.
 
+use super::pull;
 use super::standing::StandingTouch;
 use crate::inference::{Contact, Matching, Several};
 use crate::units;
 
 /// Of what a pull explains, twice the logarithm of the likelihood: more than that of noise.
 const CLEAR: f64 = 100.0;
-/// A pull leaves no more than this share of it unexplained, and a touch at least so much more: nobody believes in pulls
-/// as long as a touch will do. Of a rest to which nobody has come back so far it takes less: a touch that is missed once is
+/// A touch leaves at least so much more unexplained than a pull: nobody believes in pulls as long as a touch will do. Of a rest to which nobody has come back so far it takes less: a touch that is missed once is
 /// no harm beside one that is shown for ever.
-const EXPLAINED: f64 = 0.25;
 const WORSE: f64 = 40.0;
 const WORSE_AT_FIRST: f64 = 20.0;
 /// Looks in a row that make it sure, and seconds: of a rest to which nobody has come back so far none; but where a touch has
@@ -55,11 +54,9 @@ impl Release {
             self.looks = 0;
             return false;
         }
-        let turned: Vec<f64> = strain.iter().map(|x| -x).collect();
-        let pull = matching.find(&turned);
-        let explained = pull.unexplained < EXPLAINED * pull.strength;
+        let pull = pull::find(matching, strain);
         let better = pull.strength > CLEAR && touch.strength < pull.strength - worse;
-        let seen = explained && better && {
+        let seen = pull::explains(&pull) && better && {
             let lately = |at: u64| units::seconds_between(at, time_us) < ASK_S;
             // That it is a pull is asked until it is believed, at every sample.
             let stands = |likelier: bool| !likelier || self.looks >= LOOKS;

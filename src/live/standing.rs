@@ -1,6 +1,7 @@
 //! A touch that stands since the rest was taken while others come beside it and go: it may be the rest that is off. Where a
 //! release reads like a touch elsewhere, one look cannot tell.
 
+use super::pull;
 use crate::inference::Matching;
 
 /// Seconds for which a reading has to stay where it is before it is a level.
@@ -9,8 +10,7 @@ const LEVEL_S: f64 = 0.3;
 const OFF: f64 = 8.0;
 /// Times that others have come and gone and left it as it was.
 const RETURNS: u32 = 2;
-/// A pull leaves no more than this share of it unexplained, and only so many weighted squares more than a touch does.
-const EXPLAINED: f64 = 0.25;
+/// A pull leaves only so many weighted squares more than a touch does.
 const NO_WORSE: f64 = 10.0;
 
 /// What is read while others come and go.
@@ -81,9 +81,8 @@ fn is_off(matching: &Matching, strain: &[f64], from: &[f64]) -> bool {
 /// Whether something that lets go would read about as well.
 fn reads_like_a_pull(matching: &mut Matching, strain: &[f64]) -> bool {
     let touch = matching.find(strain);
-    let turned: Vec<f64> = strain.iter().map(|x| -x).collect();
-    let pull = matching.find(&turned);
-    pull.unexplained < EXPLAINED * pull.strength && pull.unexplained < touch.unexplained + NO_WORSE
+    let pull = pull::find(matching, strain);
+    pull::explains(&pull) && pull.unexplained < touch.unexplained + NO_WORSE
 }
 
 #[cfg(test)]

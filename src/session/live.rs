@@ -23,7 +23,8 @@ use super::slot::{Slot, current};
 use super::state::Session;
 use super::state::live::Target;
 use crate::board::{
-    ChannelFault, Faults, Illness, PressScript, RandomPresses, SimulatedBoard, Truth, script_seed,
+    ChannelFault, Faults, HardestUse, Illness, PressScript, RandomPresses, SimulatedBoard, Truth,
+    script_seed,
 };
 use crate::design::simulated_board::{BoardRequest, LASTS_S, options, places, simulated};
 use crate::design::{Inputs, Sensing, Workshop};
@@ -309,7 +310,10 @@ fn board(inputs: &Inputs, sensing: &Sensing, r: &Reporter) -> Result<SimulatedBo
     let asked = BoardRequest {
         workshop: Workshop::All,
         script,
-        hardest: Some((FORCES_N[1], LASTS_S)),
+        hardest: Some(HardestUse {
+            force: FORCES_N[1],
+            seconds: LASTS_S,
+        }),
         options: options(inputs, sensing.gauges.len()),
         faults: Faults::default(),
     };

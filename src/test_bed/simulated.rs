@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::asked::Flaws;
 use super::ready::Ready;
 use crate::bench::{Collector, CollectorNews, ContactLaw, PrinterFaults, RunEnd, SimulatedPrinter};
-use crate::board::{BoardOptions, Faults, PressScript, SimulatedBoard};
+use crate::board::{BoardOptions, Faults, HardestUse, PressScript, SimulatedBoard};
 use crate::budget::Watch;
 use crate::design::DesignError;
 use crate::design::simulated_board::{BoardRequest, LASTS_S, gives_way, options, simulated};
@@ -72,7 +72,10 @@ fn built(
     let asked = BoardRequest {
         workshop: flaws.workshop,
         script: PressScript::Held(None, 0),
-        hardest: Some((ready.asked.most_force_n, LASTS_S)),
+        hardest: Some(HardestUse {
+            force: ready.asked.most_force_n,
+            seconds: LASTS_S,
+        }),
         options,
         faults: Faults::default(),
     };

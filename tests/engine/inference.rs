@@ -4,7 +4,8 @@ use std::sync::{Arc, LazyLock};
 
 use crate::gauges;
 use hapdef::board::{
-    ChannelFault, Faults, Illness, PressScript, RAMP_S, ScriptedPress, SimulatedBoard, Truth,
+    ChannelFault, Faults, HardestUse, Illness, PressScript, RAMP_S, ScriptedPress, SimulatedBoard,
+    Truth,
 };
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
@@ -216,7 +217,10 @@ impl Bench {
         let asked = board::BoardRequest {
             workshop: Workshop::Exact,
             script,
-            hardest: Some((10.0, board::LASTS_S)),
+            hardest: Some(HardestUse {
+                force: 10.0,
+                seconds: board::LASTS_S,
+            }),
             options,
             faults,
         };

@@ -6,6 +6,7 @@
 //! (`HAPDEF_LIMB`), or a listener of finer elements (`HAPDEF_QUALITY`); what the gauges are off by is said at each test.
 
 mod bench;
+mod limb;
 
 use std::path::PathBuf;
 
@@ -14,8 +15,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use self::bench::{
-    BOARD, Bench, Heard, Press, hold, in_turn, listen, listen_with, other_limb, places, with_more,
+    BOARD, Bench, Heard, Press, hold, in_turn, listen, listen_with, places, places_on, with_more,
 };
+use self::limb::other_limb;
 use super::promise::{hapdef, text};
 
 #[test]
@@ -213,7 +215,7 @@ fn other_gauges_do_so_too() {
         presses
     };
     for ten in ["library-0", "library-4"] {
-        let bench = Bench::on(Some(ten), standing());
+        let bench = Bench::with_ten(ten, standing());
         let recording = bench.record(&with_more(&["--warming", "2"]));
         let (heard, _) = listen(&recording, &bench.exact("0.0"));
         let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
@@ -224,13 +226,33 @@ fn other_gauges_do_so_too() {
     for (k, press) in taps.iter_mut().enumerate() {
         press.ramp_ms = [2.0, 5.0, 10.0][k % 3];
     }
-    let bench = Bench::on(Some("library-4"), taps);
+    let bench = Bench::with_ten("library-4", taps);
     let quiet = ["--rate", "1000", "--bits", "24", "--noise", "0.1"];
     let recording = bench.record(&[&quiet[..], &["--workshop", "exact"]].concat());
     let (heard, _) = listen(&recording, &bench.exact("0.0"));
     let (unfelt, ghosts) = (bench.unfelt(&heard), bench.ghosts(&heard, 3.0));
     println!("taps: {unfelt:?} not felt, {ghosts} ghosts");
     assert!(unfelt.is_empty() && ghosts == 0);
+}
+
+/// So is the bundled limb, thin and held at both ends: on a solid the touch wandered away with the drift, or was lost.
+#[test]
+fn a_solid_with_gauges_does_so_too() {
+    let places = places_on("barrel", 20);
+    for at in [3, 11] {
+        let mut presses = vec![Press::new(3.0, 120.0, places[at], 1.0)];
+        presses.extend(in_turn(126.0, 2.0, 1.0, &places[..4], 1.5));
+        let bench = Bench::on_bundled("barrel", presses);
+        let recording = bench.record(&with_more(&["--warming", "2"]));
+        let (heard, _) = listen(&recording, &bench.exact("0.0"));
+        let standing = Bench::on_bundled("barrel", bench.presses[..1].to_vec());
+        let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
+        let (off, _) = standing.off(&heard);
+        let gauges = heard.iter().map(|h| h.channels_ok).min();
+        println!("place {at}: {felt:.3} felt, {ghosts} ghosts, {off:.2} mm off, {gauges:?} gauges");
+        let found = felt > 0.99 && ghosts == 0 && off < 4.0;
+        assert!(found && gauges == Some(10), "place {at}");
+    }
 }
 
 #[test]

@@ -13,22 +13,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
+use super::limb::Limb;
 use crate::promise::{hapdef, text, with};
-
-const PROJECT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/limb.hapdef.toml");
-/// Other gauges of the same limb, ten in each file.
-const TENS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/tens");
-
-/// The ten gauges that all rows are tried on in place of those of the bundled project: a name in `tests/live/tens`.
-fn other_ten() -> Option<String> {
-    std::env::var("HAPDEF_TEN").ok()
-}
-
-/// A project with chosen gauges whose limb all rows are tried on in place of the bundled one, in a folder of its own: what
-/// `hapdef design` writes.
-pub fn other_limb() -> Option<PathBuf> {
-    std::env::var_os("HAPDEF_LIMB").map(PathBuf::from)
-}
 
 /// How finely the listener computes the limb, unless a row says it itself.
 fn quality() -> String {
@@ -37,24 +23,11 @@ fn quality() -> String {
 
 /// Holds what the bundled limb and its gauges hold; of others it is said where they do not.
 pub fn hold(holds: bool, what: &str) {
-    let is_other = other_ten().is_some() || other_limb().is_some() || quality() != "draft";
+    let is_other = !Limb::tried().is_the_bundled() || quality() != "draft";
     if is_other && !holds {
         println!("does not hold {what}");
     }
     assert!(holds || is_other, "{what}");
-}
-
-/// The project of the limb, or with other gauges.
-fn told(ten: Option<&str>) -> String {
-    let read = |path: &Path| std::fs::read_to_string(path).unwrap();
-    let limb = other_limb().filter(|_| ten.is_none());
-    let bundled = read(&limb.unwrap_or_else(|| PROJECT.into()));
-    let Some(ten) = ten else {
-        return bundled;
-    };
-    let gauges = read(&Path::new(TENS).join(format!("{ten}.toml")));
-    let [from, to] = ["[[selection.site]]", "[evaluation]"].map(|at| bundled.find(at).unwrap());
-    format!("{}{gauges}\n{}", &bundled[..from], &bundled[to..])
 }
 
 /// A touch that has ended is forgotten within so much (s).
@@ -138,6 +111,8 @@ impl Heard {
 /// A bench: a folder with projects, a script, and what a board sent.
 pub struct Bench {
     told: String,
+    /// That its project may name.
+    arrays: Option<PathBuf>,
     folder: tempfile::TempDir,
     pub presses: Vec<Press>,
     /// Of the workshop that glued its gauges, and of whoever presses.
@@ -146,27 +121,27 @@ pub struct Bench {
 
 impl Bench {
     pub fn of(presses: Vec<Press>) -> Self {
-        Self::on(other_ten().as_deref(), presses)
+        Self::on(&Limb::tried(), presses)
     }
 
-    /// On the gauges of that name.
-    pub fn on(ten: Option<&str>, presses: Vec<Press>) -> Self {
-        let limb = other_limb().filter(|_| ten.is_none());
-        let folder = match &limb {
-            // Its project names its mesh from there.
-            Some(project) => tempfile::tempdir_in(project.ancestors().nth(2).unwrap()),
-            None => tempfile::tempdir(),
-        };
+    /// On other gauges of the bundled limb, by their name.
+    pub fn with_ten(ten: &str, presses: Vec<Press>) -> Self {
+        Self::on(&Limb::WithTen(ten.into()), presses)
+    }
+
+    /// On another limb of `assets`, by its name.
+    pub fn on_bundled(name: &'static str, presses: Vec<Press>) -> Self {
+        Self::on(&Limb::Bundled(name), presses)
+    }
+
+    fn on(limb: &Limb, presses: Vec<Press>) -> Self {
         let bench = Self {
-            told: told(ten),
-            folder: folder.unwrap(),
+            told: limb.told(),
+            arrays: limb.arrays(),
+            folder: limb.folder(),
             presses,
             seed: 4,
         };
-        if limb.is_none() {
-            let mesh = PathBuf::from(PROJECT).with_file_name("limb.glb");
-            std::fs::copy(mesh, bench.at("limb.glb")).unwrap();
-        }
         std::fs::write(bench.at("script.csv"), bench.script(0.0)).unwrap();
         bench.save("board.hapdef.toml", &bench.told);
         bench
@@ -219,8 +194,7 @@ impl Bench {
     fn save(&self, name: &str, project: &str) -> PathBuf {
         let path = self.at(name);
         std::fs::write(&path, project).unwrap();
-        let arrays = other_limb().map(|limb| limb.with_extension("npz"));
-        if let Some(arrays) = arrays.filter(|arrays| arrays.exists()) {
+        if let Some(arrays) = &self.arrays {
             std::fs::copy(arrays, path.with_extension("npz")).unwrap();
         }
         path
@@ -326,10 +300,19 @@ pub fn listen_with(recording: &Path, project: &Path, more: &[&str]) -> (Vec<Hear
 /// So many places on the limb's outside (mm), off the held ends.
 pub fn places(count: usize) -> Vec<DVec3> {
     static ALL: OnceLock<Vec<DVec3>> = OnceLock::new();
-    let all = ALL.get_or_init(|| match other_limb() {
-        Some(project) => felt_places(&project),
-        None => places_around(),
+    let all = ALL.get_or_init(|| match Limb::tried() {
+        Limb::Other(project) => felt_places(&project),
+        _ => places_around(),
     });
+    spread(all, count)
+}
+
+/// So many places (mm) on another limb of `assets` that its gauges feel.
+pub fn places_on(name: &'static str, count: usize) -> Vec<DVec3> {
+    spread(&felt_places(&Limb::Bundled(name).project()), count)
+}
+
+fn spread(all: &[DVec3], count: usize) -> Vec<DVec3> {
     (0..count).map(|k| all[k * all.len() / count]).collect()
 }
 
@@ -356,7 +339,10 @@ fn felt_places(project: &Path) -> Vec<DVec3> {
 
 /// On the bundled limb, one above another around it.
 fn places_around() -> Vec<DVec3> {
-    let part = cli::open(PROJECT.as_ref(), None).unwrap().inputs.part;
+    let part = cli::open(&Limb::Bundled("limb").project(), None)
+        .unwrap()
+        .inputs
+        .part;
     let mesh = part.as_given();
     let on_the_limb = |k: usize| {
         let angle = std::f64::consts::TAU * 0.381_966 * k as f64;
