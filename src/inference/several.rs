@@ -6,14 +6,20 @@
 //! followed all together (`joint`).
 
 mod coarse;
+mod density;
+mod exchange;
 mod joint;
 mod leeway;
+mod odd;
 mod spot;
 
 use glam::{DMat2, DVec3};
 
 use self::coarse::{Coarse, Whitened};
+use self::density::{of_nothing_known, sum_of};
+use self::exchange::Exchange;
 use self::joint::Joint;
+use self::odd::GaugeProof;
 use self::spot::{RADII, Spot};
 use super::matching::modes::{stand_ins, widest};
 use super::matching::weighed::Observation;
@@ -34,8 +40,10 @@ const PULL: f64 = 0.01;
 const BETTER: f64 = 0.5;
 /// One touch that is as sure as this need not be held against others.
 const SURE: f64 = 0.995;
-/// Starts that are followed.
-const PAIRS: usize = 8;
+/// Starts that are gone from, and how many of where they lead are followed.
+const PAIRS: usize = 24;
+const SINGLES: usize = 4;
+const FOLLOWED: usize = 8;
 const AREAS: usize = 3;
 const THIRDS: usize = 3;
 /// With fewer gauges nothing is told but one touch.
@@ -107,10 +115,11 @@ impl SeveralTouches {
     }
 }
 
-/// Where several touches are searched for: made once for a map.
+/// Where several touches are searched for: made once for a map; and what is known of its gauges by now.
 #[derive(Clone)]
 pub struct Several {
     coarse: std::sync::Arc<Coarse>,
+    proof: GaugeProof,
 }
 
 impl Several {
@@ -119,7 +128,13 @@ impl Several {
     pub fn new(matching: &Matching) -> Self {
         Self {
             coarse: Coarse::new(&matching.map, &matching.errors).into(),
+            proof: GaugeProof::none(matching.used.len()),
         }
+    }
+
+    /// Only one touch makes a reading (strain): what gauges read of it proves them.
+    pub fn learn(&mut self, matching: &Matching, reading: &[f64], one: &Contact) {
+        self.proof.learn(matching, reading, one);
     }
 }
 
@@ -159,22 +174,20 @@ impl Matching {
         let channels = observed.w.iter().filter(|w| **w > 0.0).count();
         let alone = self.alone(&observed, one);
         let first = ONE.ln() + alone.log_evidence();
-        let Some(best) = alone.best() else {
-            return SeveralTouches::one(*one, 1.0);
-        };
-        let sure = surely_one(best);
+        // Where a single one would have to pull, or press harder than anybody, there are more, or nothing that is known.
+        let sure = alone.best().map_or(0.0, surely_one);
         if channels < LEAST_CHANNELS || sure >= SURE {
             return SeveralTouches::one(*one, sure);
         }
-        let coarse = &several.coarse;
+        let Several { coarse, proof } = several;
         let Some(whitened) = coarse.against(&observed, self.most_force) else {
             return SeveralTouches::one(*one, sure);
         };
-        let several = self.more_than_one(&observed, coarse, &whitened);
+        let several = self.more_than_one(&observed, (coarse, &whitened), &alone);
         let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
         let rival = several.iter().fold(nothing, |most, s| most.max(s.0));
         let odd = if rival > first {
-            ODD_GAUGE.ln() + self.with_an_odd_gauge(reading, one)
+            ODD_GAUGE.ln() + self.with_an_odd_gauge(proof, reading, one)
         } else {
             f64::NEG_INFINITY
         };
@@ -200,11 +213,11 @@ impl Matching {
     fn more_than_one(
         &self,
         observed: &Observation,
-        coarse: &Coarse,
-        whitened: &Whitened,
+        (coarse, whitened): (&Coarse, &Whitened),
+        alone: &Answers,
     ) -> [(f64, Answers); 3] {
-        let two = self.two(observed, coarse, whitened);
-        let three = self.three(observed, coarse, whitened, &two);
+        let two = self.two(observed, (coarse, whitened), alone);
+        let three = self.three(observed, coarse, &two);
         let areas = coarse.areas(&self.map, whitened, AREAS);
         let areas = areas
             .iter()
@@ -230,7 +243,8 @@ impl Matching {
         let turned = Observation::new(&turned, &self.errors, &used);
         let pulled = PULL.ln() + self.alone(&turned, pull).log_evidence();
         let observed = Observation::new(reading, &self.errors, &used);
-        if ONE.ln() + self.alone(&observed, one).log_evidence() > pulled {
+        let alone = self.alone(&observed, one);
+        if ONE.ln() + alone.log_evidence() > pulled {
             return false;
         }
         // Where gauges are few several touches explain everything, a pull too.
@@ -245,7 +259,7 @@ impl Matching {
             let left = answers.best().map_or(f64::INFINITY, |best| 2.0 * best.left);
             *log > pulled && left < BETTER * pull.unexplained
         };
-        let touched = self.more_than_one(&observed, coarse, &whitened);
+        let touched = self.more_than_one(&observed, (coarse, &whitened), &alone);
         !touched.iter().any(better)
     }
 
@@ -293,54 +307,44 @@ impl Matching {
         )
     }
 
-    fn two(&self, observed: &Observation, coarse: &Coarse, whitened: &Whitened) -> Answers {
+    /// From the best pairs of a coarse share of the map, and from where one alone may be.
+    fn two(
+        &self,
+        observed: &Observation,
+        (coarse, whitened): (&Coarse, &Whitened),
+        alone: &Answers,
+    ) -> Answers {
+        let exchange = Exchange::new(&self.map, observed, coarse.making, self.most_force);
         let pairs = coarse.pairs(whitened, PAIRS);
-        Answers::of(
-            &self.map,
-            pairs
-                .iter()
-                .filter_map(|pair| self.joined(observed, pair, None)),
+        let beside = alone.0.iter().take(SINGLES);
+        let beside = beside.filter_map(|one| exchange.with_one_more(&one.spots));
+        let starts: Vec<Vec<Spot>> = pairs.iter().map(|p| p.to_vec()).chain(beside).collect();
+        self.joined_from(
+            observed,
+            &exchange.settled(starts.iter().map(Vec::as_slice), FOLLOWED),
         )
     }
 
     /// From the best two, where these leave something over.
-    fn three(
-        &self,
-        observed: &Observation,
-        coarse: &Coarse,
-        whitened: &Whitened,
-        two: &Answers,
-    ) -> Answers {
+    fn three(&self, observed: &Observation, coarse: &Coarse, two: &Answers) -> Answers {
+        let exchange = Exchange::new(&self.map, observed, coarse.making, self.most_force);
         let channels = observed.w.iter().filter(|w| **w > 0.0).count();
         let over = |joint: &&Joint| 2.0 * joint.left > channels.saturating_sub(6) as f64 + 6.0;
-        let begun = two.0.iter().take(2).filter(over);
-        let starts = begun.flat_map(|j| coarse.beside(&self.map, whitened, &j.spots, THIRDS));
-        Answers::of(
-            &self.map,
-            starts.filter_map(|start| self.joined(observed, &start, None)),
+        let begun = two.0.iter().take(THIRDS).filter(over);
+        let starts = begun.filter_map(|two| exchange.with_one_more(&two.spots));
+        let starts: Vec<Vec<Spot>> = starts.collect();
+        self.joined_from(
+            observed,
+            &exchange.settled(starts.iter().map(Vec::as_slice), FOLLOWED),
         )
     }
 
-    /// Logarithm of the density where one gauge reads nothing, or anything, and one point touches.
-    fn with_an_odd_gauge(&mut self, reading: &[f64], found: &Contact) -> f64 {
-        /// Deviation of what a dead gauge reads, over its noise.
-        const AT_REST: f64 = 4.0;
-        let used = self.used.clone();
-        let trusted: Vec<usize> = (0..used.len()).filter(|&c| used[c]).collect();
-        let squares: f64 = trusted.iter().map(|&c| reading[c] * reading[c]).sum();
-        let rms = (squares / trusted.len() as f64).sqrt();
-        let mut logs = Vec::new();
-        for &c in &trusted {
-            self.used[c] = false;
-            let without = self.used.clone();
-            let observed = Observation::new(reading, &self.errors, &without);
-            let others = self.alone(&observed, found).log_evidence();
-            let noise = self.errors.noise[c];
-            let ways = [AT_REST * noise, rms.hypot(noise)];
-            logs.extend(ways.map(|off| others + log_density(reading[c], off)));
-            self.used[c] = true;
-        }
-        sum_of(logs.iter().copied()) - (2.0 * trusted.len() as f64).ln()
+    fn joined_from(&self, observed: &Observation, starts: &[Vec<Spot>]) -> Answers {
+        let starts = starts.iter();
+        Answers::of(
+            &self.map,
+            starts.filter_map(|spots| self.joined(observed, spots, None)),
+        )
     }
 
     fn touches(
@@ -438,29 +442,4 @@ fn surely_one(best: &Joint) -> f64 {
     let log_room = best.log_evidence - best.log_likelihood();
     let others = (1.0 - ONE) / ONE * (best.left + log_room).exp();
     (1.0 + others).recip()
-}
-
-/// Logarithm of the density of a reading of which nothing is known but how large it is, but for 2π to the power of half
-/// the channels.
-fn of_nothing_known(observed: &Observation) -> f64 {
-    let trusted = || (observed.reading().iter().zip(&observed.w)).filter(|(_, w)| **w > 0.0);
-    let count = trusted().count().max(1) as f64;
-    let rms = (trusted().map(|(x, _)| x * x).sum::<f64>() / count).sqrt();
-    trusted()
-        .map(|(x, w)| log_density(*x, rms.hypot(w.recip().sqrt())))
-        .sum()
-}
-
-/// Logarithm of a normal density around zero, but for √2π.
-fn log_density(value: f64, deviation: f64) -> f64 {
-    -0.5 * (value / deviation).powi(2) - deviation.ln()
-}
-
-/// Logarithm of a sum of exponentials.
-fn sum_of(logs: impl Iterator<Item = f64> + Clone) -> f64 {
-    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
-    if most == f64::NEG_INFINITY {
-        return most;
-    }
-    most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
 }

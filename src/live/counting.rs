@@ -8,8 +8,10 @@ use crate::units;
 const SETTLED_S: f64 = 0.2;
 const UNSETTLED_S: f64 = 0.05;
 /// What is shown is given up when it is less likely than this in so many looks in a row.
-const DOUBTED: f64 = 0.1;
+const DOUBTED: f64 = 0.3;
 const LOOKS: u32 = 2;
+/// A touch that is as likely the only one proves gauges.
+const PROVED: f64 = 0.95;
 
 /// Of the weighted squares that the last look left over: by so much more, and beyond so many deviations of χ², something
 /// else has come to touch, or has gone.
@@ -116,14 +118,17 @@ impl Counting {
         let seen = matching.count(&self.several, strain, one);
         let channels = matching.used.iter().filter(|u| **u).count() as f64;
         self.usual = MORE * seen.unexplained + channels + BEYOND * (2.0 * channels).sqrt();
-        let one = SeveralTouches::one(*one, 1.0);
-        let shown = self.shown.as_ref().unwrap_or(&one);
+        let point = SeveralTouches::one(*one, 1.0);
+        if seen.alike(&point) && seen.probability > PROVED && self.shown.is_none() {
+            self.several.learn(matching, strain, one);
+        }
+        let shown = self.shown.as_ref().unwrap_or(&point);
         let share = seen.share_of(shown);
         self.doubted = if share < DOUBTED { self.doubted + 1 } else { 0 };
         if seen.alike(shown) || self.doubted >= LOOKS {
             self.doubted = 0;
             self.sure_of_one = seen.probability;
-            self.shown = (!seen.alike(&one)).then_some(seen);
+            self.shown = (!seen.alike(&point)).then_some(seen);
         } else if let Some(shown) = &mut self.shown {
             shown.probability = share;
         } else {

@@ -235,24 +235,45 @@ fn other_gauges_do_so_too() {
     assert!(unfelt.is_empty() && ghosts == 0);
 }
 
-/// So is the bundled limb, thin and held at both ends: on a solid the touch wandered away with the drift, or was lost.
+/// The bundled limb is kind to us too, thin and held at both ends. On a solid a standing touch wandered away with the drift, or
+/// was lost; and a quarter of all second fingers were searched for in the wrong place, where readings change fast near a gauge.
 #[test]
-fn a_solid_with_gauges_does_so_too() {
+fn a_solid_does_so_too_and_two_fingers_on_it_are_two() {
     let places = places_on("barrel", 20);
-    for at in [3, 11] {
-        let mut presses = vec![Press::new(3.0, 120.0, places[at], 1.0)];
-        presses.extend(in_turn(126.0, 2.0, 1.0, &places[..4], 1.5));
-        let bench = Bench::on_bundled("barrel", presses);
-        let recording = bench.record(&with_more(&["--warming", "2"]));
-        let (heard, _) = listen(&recording, &bench.exact("0.0"));
-        let standing = Bench::on_bundled("barrel", bench.presses[..1].to_vec());
-        let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
-        let (off, _) = standing.off(&heard);
-        let gauges = heard.iter().map(|h| h.channels_ok).min();
-        println!("place {at}: {felt:.3} felt, {ghosts} ghosts, {off:.2} mm off, {gauges:?} gauges");
-        let found = felt > 0.99 && ghosts == 0 && off < 4.0;
-        assert!(found && gauges == Some(10), "place {at}");
+    let mut presses = vec![Press::new(3.0, 120.0, places[3], 1.0)];
+    presses.extend(in_turn(126.0, 2.0, 1.0, &places[..4], 1.5));
+    let apart = |k: &usize| places[*k].distance(places[(*k + 7) % 20]) >= 25.0;
+    for (pair, k) in (0..20).filter(apart).enumerate() {
+        let start = 136.0 + 2.2 * pair as f64;
+        let force = |of: usize| 8.0 + 12.0 * (0.37 * of as f64).fract();
+        presses.push(Press::new(start, 1.1, places[k], force(k)));
+        presses.push(Press::new(
+            start + 0.1,
+            1.0,
+            places[(k + 7) % 20],
+            force(k + 7),
+        ));
     }
+    let bench = Bench::on_bundled("barrel", presses);
+    let recording = bench.record(&with_more(&["--warming", "2"]));
+    let (heard, _) = listen(&recording, &bench.exact("0.0"));
+    let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
+    let gauges = heard.iter().map(|h| h.channels_ok).min();
+    let standing = Bench::on_bundled("barrel", bench.presses[..1].to_vec());
+    let (off, _) = standing.off(&heard);
+    println!("barrel: {felt:.3} felt, {ghosts} ghosts, {off:.2} mm off, {gauges:?} gauges");
+    assert!(felt > 0.99 && ghosts == 0 && off < 4.0 && gauges == Some(10));
+    let (mut two, mut all) = (0, 0);
+    for pair in bench.presses[5..].chunks(2) {
+        let full = pair[1].full_s().start + 0.1..pair[0].full_s().end;
+        for h in heard.iter().filter(|h| full.contains(&h.time_s)) {
+            all += 1;
+            two += i32::from(h.touches.len() == 2);
+        }
+    }
+    let share = f64::from(two) / f64::from(all);
+    println!("barrel: {share:.3} of {all} are two");
+    assert!(share > 0.85);
 }
 
 #[test]

@@ -1,5 +1,4 @@
-//! Where to begin: the best pairs of places on a coarse share of the map, all of them looked at, a third beside two, and
-//! the best areas.
+//! Where to begin: the best pairs of places on a coarse share of the map, all of them looked at, and the best areas.
 //!
 //! Here all channels are off by shares of the reading, the same for all touches, so that forces have a closed form: with
 //! readings a, b of a newton at two places and y of both, whitened,
@@ -39,7 +38,7 @@ pub(super) struct Coarse {
     readings: Vec<Vec<f64>>,
     areas: Vec<(SurfacePoint, f64, Vec<f64>)>,
     /// What gluing and the making of touches put on readings, over these, in the mean of all places.
-    making: f64,
+    pub making: f64,
 }
 
 impl Coarse {
@@ -143,60 +142,6 @@ impl Coarse {
             [0, 1].map(|k| self.spot(pair[k], forces[k]))
         };
         chosen.into_iter().map(spots).collect()
-    }
-
-    /// The best places for one more beside some spots.
-    pub fn beside(
-        &self,
-        map: &ResponseMap,
-        whitened: &Whitened,
-        spots: &[Spot],
-        count: usize,
-    ) -> Vec<Vec<Spot>> {
-        let mut basis: Vec<DVector<f64>> = Vec::new();
-        let mut left = whitened.reading.clone();
-        for spot in spots {
-            let mut v = whitened.of(&map.at(spot.at));
-            for b in &basis {
-                let along = b.dot(&v);
-                v.axpy(-along, b, 1.0);
-            }
-            let length = v.norm();
-            if length > 0.0 {
-                v /= length;
-                let along = v.dot(&left);
-                left.axpy(-along, &v, 1.0);
-                basis.push(v);
-            }
-        }
-        let gain = |(k, point): (usize, &DVector<f64>)| {
-            let s = point.dot(&left);
-            let along: f64 = basis.iter().map(|b| b.dot(point).powi(2)).sum();
-            let d = point.norm_squared() - along;
-            let clear = d > 0.01 * point.norm_squared() && s > 0.0;
-            clear.then_some((s * s / d, k, s / d))
-        };
-        let mut best: Vec<(f64, usize, f64)> = whitened
-            .points
-            .iter()
-            .enumerate()
-            .filter_map(gain)
-            .collect();
-        best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut chosen: Vec<usize> = Vec::new();
-        let mut starts = Vec::new();
-        for (_, k, force) in best {
-            let place = self.positions[k];
-            let new = chosen
-                .iter()
-                .all(|&c| self.positions[c].distance(place) >= SAME);
-            if new && chosen.len() < count {
-                chosen.push(k);
-                let more = self.spot(k, force.min(whitened.most_force));
-                starts.push(spots.iter().copied().chain([more]).collect());
-            }
-        }
-        starts
     }
 
     /// The best areas, apart from each other.

@@ -1,0 +1,68 @@
+//! One gauge may say something else than it feels. It is held against several touches; less so where it was right lately.
+
+use super::density::{log_density, log_of_anything, sum_of};
+use super::{Contact, Matching, SeveralTouches};
+use crate::inference::matching::weighed::Observation;
+
+/// Deviation of what a dead gauge reads, over its noise.
+const AT_REST: f64 = 4.0;
+/// How much less likely a gauge that was right is odd now, at most (logarithm of a hundred): it may break at any time.
+const MOST: f64 = 4.6;
+
+/// What touches before have proved of gauges.
+#[derive(Clone)]
+pub(super) struct GaugeProof {
+    /// Logarithms of how much less likely each reads anything.
+    less: Vec<f64>,
+}
+
+impl GaugeProof {
+    pub fn none(gauges: usize) -> Self {
+        Self {
+            less: vec![0.0; gauges],
+        }
+    }
+
+    /// Of one touch that alone makes a reading (strain): how much likelier what each gauge reads is of it than of a gauge
+    /// that reads anything.
+    pub fn learn(&mut self, matching: &Matching, reading: &[f64], one: &Contact) {
+        let observed = Observation::new(reading, &matching.errors, &matching.used);
+        let expected = matching.reading_of_all(&SeveralTouches::one(*one, 1.0));
+        let at = matching.map.mesh.index().nearest(one.position).0;
+        let glued = (matching.errors.deviations.as_ref()).map(|d| d.own.at(at));
+        for (c, less) in self.less.iter_mut().enumerate() {
+            if observed.w[c] > 0.0 {
+                let glued = glued.as_ref().map_or(0.0, |own| own[c] * one.force);
+                let off = observed.w[c].recip().sqrt().hypot(glued);
+                let right = log_density(reading[c] - expected[c], off);
+                let any = log_of_anything(reading[c], matching.errors.noise[c]);
+                *less = less.max((right - any).min(MOST));
+            }
+        }
+    }
+}
+
+impl Matching {
+    /// Logarithm of the density where one gauge reads nothing, or anything, and one point touches.
+    pub(super) fn with_an_odd_gauge(
+        &mut self,
+        proof: &GaugeProof,
+        reading: &[f64],
+        found: &Contact,
+    ) -> f64 {
+        let used = self.used.clone();
+        let trusted: Vec<usize> = (0..used.len()).filter(|&c| used[c]).collect();
+        let mut logs = Vec::new();
+        for &c in &trusted {
+            self.used[c] = false;
+            let without = self.used.clone();
+            let observed = Observation::new(reading, &self.errors, &without);
+            let others = self.alone(&observed, found).log_evidence();
+            let noise = self.errors.noise[c];
+            logs.push(others + log_density(reading[c], AT_REST * noise));
+            logs.push(others + log_of_anything(reading[c], noise) - proof.less[c]);
+            self.used[c] = true;
+        }
+        sum_of(logs.iter().copied()) - (2.0 * trusted.len() as f64).ln()
+    }
+}
