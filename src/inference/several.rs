@@ -2,8 +2,8 @@
 //! density of the reading over all touches that there may be of so many (`MacKay`, Neural Computation 4, 1992).
 //!
 //! One point, two, three, or an area; against them stands that a gauge says something else than it feels, and that the
-//! reading is of nothing that is known. Two are searched for among all pairs of a coarse share of the map (`coarse`), and
-//! followed all together (`joint`).
+//! reading is of nothing that is known. Two are searched for among all pairs of a coarse share of the map (`coarse`), then on all
+//! templates one beside the other (`exchange`), and followed all together (`joint`).
 
 mod coarse;
 mod density;
@@ -27,6 +27,7 @@ use super::matching::{Contact, Load, Matching};
 use crate::inference::deviation::TouchDoubts;
 use crate::inference::map::ResponseMap;
 use crate::inference::region::CredibleRegion;
+use crate::mesh::SurfacePoint;
 
 /// Before anything is read. A pull is none of them: it is held against them by itself.
 const ONE: f64 = 0.88;
@@ -41,7 +42,7 @@ const BETTER: f64 = 0.5;
 /// One touch that is as sure as this need not be held against others.
 const SURE: f64 = 0.995;
 /// Starts that are gone from, and how many of where they lead are followed.
-const PAIRS: usize = 24;
+const PAIRS: usize = 16;
 const SINGLES: usize = 4;
 const FOLLOWED: usize = 8;
 const AREAS: usize = 3;
@@ -132,6 +133,11 @@ impl Several {
         }
     }
 
+    /// Nothing is known of gauges any more.
+    pub fn forget(&mut self) {
+        self.proof.forget();
+    }
+
     /// Only one touch makes a reading (strain): what gauges read of it proves them.
     pub fn learn(&mut self, matching: &Matching, reading: &[f64], one: &Contact) {
         self.proof.learn(matching, reading, one);
@@ -174,8 +180,13 @@ impl Matching {
         let channels = observed.w.iter().filter(|w| **w > 0.0).count();
         let alone = self.alone(&observed, one);
         let first = ONE.ln() + alone.log_evidence();
-        // Where a single one would have to pull, or press harder than anybody, there are more, or nothing that is known.
-        let sure = alone.best().map_or(0.0, surely_one);
+        let sure = match alone.best() {
+            Some(best) => surely_one(best),
+            // Too light to tell any others.
+            None if channels < LEAST_CHANNELS || one.strength > one.unexplained => 1.0,
+            // A single one would have to pull.
+            None => 0.0,
+        };
         if channels < LEAST_CHANNELS || sure >= SURE {
             return SeveralTouches::one(*one, sure);
         }
@@ -318,11 +329,12 @@ impl Matching {
         let pairs = coarse.pairs(whitened, PAIRS);
         let beside = alone.0.iter().take(SINGLES);
         let beside = beside.filter_map(|one| exchange.with_one_more(&one.spots));
-        let starts: Vec<Vec<Spot>> = pairs.iter().map(|p| p.to_vec()).chain(beside).collect();
-        self.joined_from(
-            observed,
-            &exchange.settled(starts.iter().map(Vec::as_slice), FOLLOWED),
-        )
+        let beside: Vec<Vec<Spot>> = beside.collect();
+        let starts = pairs.iter().map(|pair| pair.to_vec());
+        let starts = starts.chain(beside.iter().map(|spots| places_of(spots)));
+        let settled = exchange.settled(starts, FOLLOWED);
+        // Near a gauge no template may read as the place between them that one alone has led to.
+        self.joined_from(observed, settled.iter().chain(&beside))
     }
 
     /// From the best two, where these leave something over.
@@ -332,15 +344,15 @@ impl Matching {
         let over = |joint: &&Joint| 2.0 * joint.left > channels.saturating_sub(6) as f64 + 6.0;
         let begun = two.0.iter().take(THIRDS).filter(over);
         let starts = begun.filter_map(|two| exchange.with_one_more(&two.spots));
-        let starts: Vec<Vec<Spot>> = starts.collect();
-        self.joined_from(
-            observed,
-            &exchange.settled(starts.iter().map(Vec::as_slice), FOLLOWED),
-        )
+        let settled = exchange.settled(starts.map(|spots| places_of(&spots)), FOLLOWED);
+        self.joined_from(observed, settled.iter())
     }
 
-    fn joined_from(&self, observed: &Observation, starts: &[Vec<Spot>]) -> Answers {
-        let starts = starts.iter();
+    fn joined_from<'a>(
+        &self,
+        observed: &Observation,
+        starts: impl Iterator<Item = &'a Vec<Spot>>,
+    ) -> Answers {
         Answers::of(
             &self.map,
             starts.filter_map(|spots| self.joined(observed, spots, None)),
@@ -420,7 +432,11 @@ fn are_the_same(map: &ResponseMap, one: &Joint, other: &Joint) -> bool {
     })
 }
 
-fn point(at: crate::mesh::SurfacePoint, force: f64) -> Spot {
+fn places_of(spots: &[Spot]) -> Vec<SurfacePoint> {
+    spots.iter().map(|spot| spot.at).collect()
+}
+
+fn point(at: SurfacePoint, force: f64) -> Spot {
     Spot {
         at,
         force,

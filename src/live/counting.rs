@@ -57,6 +57,12 @@ impl Counting {
         }
     }
 
+    /// As if nothing had been seen before.
+    pub fn begin_anew(&mut self) {
+        self.end();
+        self.several.forget();
+    }
+
     /// Nothing touches any more, or something else does.
     pub fn end(&mut self) {
         (self.shown, self.last_look) = (None, None);
@@ -119,7 +125,10 @@ impl Counting {
         let channels = matching.used.iter().filter(|u| **u).count() as f64;
         self.usual = MORE * seen.unexplained + channels + BEYOND * (2.0 * channels).sqrt();
         let point = SeveralTouches::one(*one, 1.0);
-        if seen.alike(&point) && seen.probability > PROVED && self.shown.is_none() {
+        // Not where it is one because a gauge is odd.
+        let explained = one.unexplained < channels + BEYOND * (2.0 * channels).sqrt();
+        let surely_one = seen.alike(&point) && seen.probability > PROVED;
+        if surely_one && explained && self.shown.is_none() {
             self.several.learn(matching, strain, one);
         }
         let shown = self.shown.as_ref().unwrap_or(&point);

@@ -106,6 +106,7 @@ impl Pipeline {
         if settings.channels != self.settings.channels {
             // Other channels have another rest.
             (self.ground.rest, self.taring) = (None, None);
+            self.counting.begin_anew();
         }
         let mut chain = settings.chain;
         if let Some(hello) = &self.hello {
@@ -147,6 +148,7 @@ impl Pipeline {
         self.ground.begin_anew(&self.settings, self.rate);
         self.allow_for_drift();
         self.end_touch();
+        self.counting.begin_anew();
     }
 
     /// Gauges that were found dead.

@@ -9,8 +9,8 @@ use crate::units;
 
 /// Of what a pull explains, twice the logarithm of the likelihood: more than that of noise.
 const CLEAR: f64 = 100.0;
-/// A touch leaves at least so much more unexplained than a pull: nobody believes in pulls as long as a touch will do. Of a rest to which nobody has come back so far it takes less: a touch that is missed once is
-/// no harm beside one that is shown for ever.
+/// A touch leaves at least so much more unexplained than a pull: nobody believes in pulls as long as a touch will do. Of a rest to
+/// which nobody has come back so far it takes less: a touch that is missed once is no harm beside one that is shown for ever.
 const WORSE: f64 = 40.0;
 const WORSE_AT_FIRST: f64 = 20.0;
 /// Looks in a row that make it sure, and seconds: of a rest to which nobody has come back so far none; but where a touch has

@@ -220,7 +220,7 @@ fn other_gauges_do_so_too() {
         let (heard, _) = listen(&recording, &bench.exact("0.0"));
         let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
         println!("{ten}, 2 microstrain a second: {felt:.3} felt, {ghosts} ghosts");
-        assert!(felt > 0.99 && ghosts == 0, "{ten}");
+        hold(felt > 0.99 && ghosts == 0, ten);
     }
     let mut taps = in_turn(3.0, 0.5, 0.12, &places, 8.0);
     for (k, press) in taps.iter_mut().enumerate() {
@@ -232,7 +232,7 @@ fn other_gauges_do_so_too() {
     let (heard, _) = listen(&recording, &bench.exact("0.0"));
     let (unfelt, ghosts) = (bench.unfelt(&heard), bench.ghosts(&heard, 3.0));
     println!("taps: {unfelt:?} not felt, {ghosts} ghosts");
-    assert!(unfelt.is_empty() && ghosts == 0);
+    hold(unfelt.is_empty() && ghosts == 0, "all felt and no ghosts");
 }
 
 /// The bundled limb is kind to us too, thin and held at both ends. On a solid a standing touch wandered away with the drift, or
@@ -258,11 +258,15 @@ fn a_solid_does_so_too_and_two_fingers_on_it_are_two() {
     let recording = bench.record(&with_more(&["--warming", "2"]));
     let (heard, _) = listen(&recording, &bench.exact("0.0"));
     let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
-    let gauges = heard.iter().map(|h| h.channels_ok).min();
+    let live = heard.iter().filter(|h| h.time_s > 3.0);
+    let gauges = live.map(|h| h.channels_ok).min();
     let standing = Bench::on_bundled("barrel", bench.presses[..1].to_vec());
     let (off, _) = standing.off(&heard);
     println!("barrel: {felt:.3} felt, {ghosts} ghosts, {off:.2} mm off, {gauges:?} gauges");
-    assert!(felt > 0.99 && ghosts == 0 && off < 4.0 && gauges == Some(10));
+    hold(
+        felt > 0.99 && ghosts == 0 && off < 4.0 && gauges == Some(10),
+        "felt, 4 mm, ten gauges and no ghosts",
+    );
     let (mut two, mut all) = (0, 0);
     for pair in bench.presses[5..].chunks(2) {
         let full = pair[1].full_s().start + 0.1..pair[0].full_s().end;
@@ -273,7 +277,7 @@ fn a_solid_does_so_too_and_two_fingers_on_it_are_two() {
     }
     let share = f64::from(two) / f64::from(all);
     println!("barrel: {share:.3} of {all} are two");
-    assert!(share > 0.85);
+    hold(share > 0.85, "two in 85 %");
 }
 
 #[test]

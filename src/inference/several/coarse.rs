@@ -83,10 +83,9 @@ impl Coarse {
         let n = trusted.len();
         let x: Vec<f64> = trusted.iter().map(|&c| observed.reading()[c]).collect();
         let mean = x.iter().map(|x| x * x).sum::<f64>() / n as f64;
-        let share = BETWEEN * BETWEEN + self.making * self.making;
         let mut covariance = DMatrix::from_element(n, n, observed.drift);
         for (k, &c) in trusted.iter().enumerate() {
-            covariance[(k, k)] += observed.w[c].recip() + share * f64::midpoint(x[k] * x[k], mean);
+            covariance[(k, k)] += observed.w[c].recip() + off_between(x[k], mean, self.making);
         }
         let whitening = covariance.cholesky()?.l().try_inverse()?;
         let mut whitened = Whitened {
@@ -104,17 +103,8 @@ impl Coarse {
         Some(whitened)
     }
 
-    fn spot(&self, place: usize, force: f64) -> Spot {
-        Spot {
-            at: self.places[place],
-            force,
-            radius: None,
-            about: TouchDoubts::default(),
-        }
-    }
-
     /// The best pairs, apart from each other.
-    pub fn pairs(&self, whitened: &Whitened, count: usize) -> Vec<[Spot; 2]> {
+    pub fn pairs(&self, whitened: &Whitened, count: usize) -> Vec<[SurfacePoint; 2]> {
         let blocks = whitened.blocks(&self.positions);
         let count_of = self.places.len();
         let mut best: Vec<(f32, usize, usize)> = (0..count_of)
@@ -137,11 +127,8 @@ impl Coarse {
                 break;
             }
         }
-        let spots = |pair: [usize; 2]| {
-            let forces = whitened.forces(pair);
-            [0, 1].map(|k| self.spot(pair[k], forces[k]))
-        };
-        chosen.into_iter().map(spots).collect()
+        let places = chosen.into_iter();
+        places.map(|pair| pair.map(|k| self.places[k])).collect()
     }
 
     /// The best areas, apart from each other.
@@ -173,6 +160,12 @@ impl Coarse {
     }
 }
 
+/// What a channel that reads x (strain) may be off by (strain²) because touches lie between places, and because of how they and
+/// their gauges are made, with the mean square of all channels.
+pub(super) fn off_between(x: f64, mean: f64, making: f64) -> f64 {
+    (BETWEEN * BETWEEN + making * making) * f64::midpoint(x * x, mean)
+}
+
 /// A reading, and what is read of a newton at all places, under the covariance that they are compared by.
 pub(super) struct Whitened {
     reading: DVector<f64>,
@@ -188,14 +181,6 @@ impl Whitened {
     fn of(&self, reading: &[f64]) -> DVector<f64> {
         let picked = self.trusted.iter().map(|&c| reading[c]);
         &self.whitening * DVector::from_iterator(self.trusted.len(), picked)
-    }
-
-    fn forces(&self, [i, j]: [usize; 2]) -> [f64; 2] {
-        let (a, b, y) = (&self.points[i], &self.points[j], &self.reading);
-        let (aa, bb, ab) = (a.norm_squared(), b.norm_squared(), a.dot(b));
-        let (s, t) = (a.dot(y), b.dot(y));
-        let apart = aa * bb - ab * ab;
-        [(s * bb - t * ab) / apart, (t * aa - s * ab) / apart]
     }
 
     fn blocks(&self, positions: &[DVec3]) -> PlaceBlocks {

@@ -14,6 +14,7 @@
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
+use super::coarse;
 use super::joint::APART;
 use super::point;
 use super::spot::Spot;
@@ -23,8 +24,6 @@ use crate::lanes::wide;
 use crate::mesh::SurfacePoint;
 use crate::units::{microstrain2, per_microstrain, per_microstrain2};
 
-/// What readings may be off by because touches are not at templates, over the reading.
-const BETWEEN: f64 = 0.05;
 /// Times that every spot is looked at again.
 const ROUNDS: usize = 3;
 /// Half of the weighted squares that it takes to go on.
@@ -82,14 +81,9 @@ impl<'a> Exchange<'a> {
         let reading = observed.reading();
         let trusted = || (reading.iter().zip(&observed.w)).filter(|(_, w)| **w > 0.0);
         let mean = trusted().map(|(x, _)| x * x).sum::<f64>() / trusted().count().max(1) as f64;
-        let share = BETWEEN * BETWEEN + making * making;
         let weight = |(x, w): (&f64, &f64)| {
-            let off = share * f64::midpoint(x * x, mean);
-            if *w > 0.0 {
-                (w.recip() + off).recip()
-            } else {
-                0.0
-            }
+            let variance = w.recip() + coarse::off_between(*x, mean, making);
+            if *w > 0.0 { variance.recip() } else { 0.0 }
         };
         let weights: Vec<f64> = reading.iter().zip(&observed.w).map(weight).collect();
         Self {
@@ -102,13 +96,13 @@ impl<'a> Exchange<'a> {
     }
 
     /// Where spots go from several starts, so many at most: those that explain most, each with the forces that suit it.
-    pub fn settled<'s>(
+    pub fn settled(
         &self,
-        starts: impl Iterator<Item = &'s [Spot]>,
+        starts: impl Iterator<Item = Vec<SurfacePoint>>,
         most: usize,
     ) -> Vec<Vec<Spot>> {
         let mut settled: Vec<Explained> = starts
-            .map(|start| self.settle(start))
+            .map(|start| self.settle(&start))
             .filter(|settled| settled.gain > 0.0)
             .collect();
         settled.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -129,19 +123,21 @@ impl<'a> Exchange<'a> {
     }
 
     /// Where spots go from a start.
-    fn settle(&self, start: &[Spot]) -> Explained {
-        let places = start.iter().map(|spot| self.place(spot.at));
-        let mut best = self.explained(places.collect());
-        for _ in 0..ROUNDS {
-            let before = best.gain;
-            for _ in start {
-                best.places.rotate_left(1);
-                let others = &best.places[..start.len() - 1];
-                best = (self.with_another(others.to_vec()))
-                    .filter(|next| next.gain > best.gain + GAINED)
-                    .unwrap_or(best);
+    fn settle(&self, start: &[SurfacePoint]) -> Explained {
+        let mut best = self.explained(start.iter().map(|&at| self.place(at)).collect());
+        // Until all of them have been looked at and none has gone on.
+        let mut idle = 0;
+        for _ in 0..ROUNDS * start.len() {
+            best.places.rotate_left(1);
+            let others = &best.places[..start.len() - 1];
+            let next = self.with_another(others.to_vec());
+            if let Some(next) = next.filter(|next| next.gain > best.gain + GAINED) {
+                // The one that has gone on is where it is best.
+                (best, idle) = (next, 1);
+            } else {
+                idle += 1;
             }
-            if best.gain == before {
+            if idle == start.len() {
                 break;
             }
         }
@@ -162,8 +158,7 @@ impl<'a> Exchange<'a> {
         let held = self.hold(&places)?;
         let (gain, node) = best_beside(&self.map.templates, &self.map.places, &held);
         (gain > 0.0).then(|| {
-            let at = self.map.mesh.index().nearest(self.map.places[node]).0;
-            places.push(self.place(at));
+            places.push(self.place(self.map.mesh.vertex_point(node)));
             self.explained(places)
         })
     }
@@ -207,6 +202,7 @@ impl<'a> Exchange<'a> {
 
     /// Some places, beside which another is searched for.
     fn hold(&self, others: &[Place]) -> Option<HeldPlaces> {
+        debug_assert!(others.len() <= MOST, "no more are held in the inner loop");
         let (products, with_reading) = self.products(others);
         let inverse = products.cholesky()?.inverse();
         let forces = &inverse * with_reading;
@@ -219,7 +215,7 @@ impl<'a> Exchange<'a> {
                 .get(k)
                 .map_or_else(|| vec![0.0; self.reading.len()], |p| single(&p.reading))
         };
-        // Of a newton, not of a strain, and templates are in microstrain.
+        // K (N²) and F (N) hold no strain, and are not scaled.
         let known = |i: usize, j: usize| inverse.get((i, j)).map_or(0.0, |v| *v as f32);
         Some(HeldPlaces {
             positions: others.iter().map(|place| place.position).collect(),
@@ -360,10 +356,6 @@ mod tests {
         (0..CHANNELS).map(of).collect()
     }
 
-    fn spot(map: &ResponseMap, node: usize) -> Spot {
-        point(map.mesh.index().nearest(map.places[node]).0, 1.0)
-    }
-
     #[test]
     fn the_inner_loop_finds_what_trying_all_finds() {
         let map = plate();
@@ -378,7 +370,7 @@ mod tests {
             let reading = read(&map, &touches);
             let observed = Observation::new(&reading, &errors, &[true; CHANNELS]);
             let exchange = Exchange::new(&map, &observed, 0.05, 60.0);
-            let at = |node: usize| exchange.place(spot(&map, node).at);
+            let at = |node: usize| exchange.place(map.mesh.vertex_point(node));
             // Of which the first is not where it is held.
             let nodes = [97, 610].into_iter().take(touches.len() - 1);
             let others: Vec<Place> = nodes.map(at).collect();
@@ -411,23 +403,33 @@ mod tests {
         let errors = ReadingErrors::of_noise(1e-6, CHANNELS);
         let observed = Observation::new(&reading, &errors, &[true; CHANNELS]);
         let exchange = Exchange::new(&map, &observed, 0.0, 60.0);
-        // Fourteen and twenty millimetres off.
-        let start = [102, 310 + 9].map(|node| spot(&map, node));
-        let found = exchange.settled([&start[..]].into_iter(), 1);
-        for (node, force) in touches {
-            let is_there = |spot: &Spot| {
-                let off = map.mesh.point(spot.at).distance(map.places[node]);
-                off < 1e-6 && (spot.force - force).abs() < 0.01 * force
-            };
-            assert!(found[0].iter().any(is_there), "{found:?}");
+        let is_found = |found: &[Spot]| {
+            touches.iter().all(|&(node, force)| {
+                let is_there = |spot: &Spot| {
+                    let off = map.mesh.point(spot.at).distance(map.places[node]);
+                    off < 1e-6 && (spot.force - force).abs() < 0.01 * force
+                };
+                found.iter().any(is_there)
+            })
+        };
+        let start = |nodes: [usize; 2]| nodes.map(|node| map.mesh.vertex_point(node)).to_vec();
+        // One of them twenty millimetres off, or both four.
+        for nodes in [[105, 610], [97, 612]] {
+            let found = exchange.settled([start(nodes)].into_iter(), 1);
+            assert!(is_found(&found[0]), "{nodes:?}: {found:?}");
         }
-        // So it is from one of them alone.
-        let both = exchange.with_one_more(&[spot(&map, touches[1].0)]).unwrap();
-        assert!(both[1].at == spot(&map, touches[0].0).at, "{both:?}");
-        // What only a pull would explain is not explained.
-        let pulled: Vec<f64> = reading.iter().map(|x| -x).collect();
-        let observed = Observation::new(&pulled, &errors, &[true; CHANNELS]);
-        let exchange = Exchange::new(&map, &observed, 0.0, 1e-3);
-        assert!(exchange.settled([&start[..]].into_iter(), 1).is_empty());
+        // Two starts that lead to the same are one.
+        let starts = [start([105, 610]), start([97, 612])];
+        assert_eq!(exchange.settled(starts.into_iter(), 4).len(), 1);
+        let one = point(map.mesh.vertex_point(610), 1.0);
+        let both = exchange.with_one_more(&[one]).unwrap();
+        assert!(is_found(&both), "{both:?}");
+        // Where nobody presses so hard nothing is explained.
+        let exchange = Exchange::new(&map, &observed, 0.0, 1e-6);
+        assert!(
+            exchange
+                .settled([start([95, 610])].into_iter(), 1)
+                .is_empty()
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! One gauge may say something else than it feels. It is held against several touches; less so where it was right lately.
+//! One gauge may say something else than it feels. That is held against several touches; less so of one that was right lately.
 
 use super::density::{log_density, log_of_anything, sum_of};
 use super::{Contact, Matching, SeveralTouches};
@@ -6,8 +6,10 @@ use crate::inference::matching::weighed::Observation;
 
 /// Deviation of what a dead gauge reads, over its noise.
 const AT_REST: f64 = 4.0;
-/// How much less likely a gauge that was right is odd now, at most (logarithm of a hundred): it may break at any time.
+/// How much less likely a gauge that was right is odd now, at most (logarithm of a hundred): it may break at any time. And the
+/// share of one look in that.
 const MOST: f64 = 4.6;
+const ONE_LOOK: f64 = 0.1;
 
 /// What touches before have proved of gauges.
 #[derive(Clone)]
@@ -23,6 +25,10 @@ impl GaugeProof {
         }
     }
 
+    pub fn forget(&mut self) {
+        self.less.fill(0.0);
+    }
+
     /// Of one touch that alone makes a reading (strain): how much likelier what each gauge reads is of it than of a gauge
     /// that reads anything.
     pub fn learn(&mut self, matching: &Matching, reading: &[f64], one: &Contact) {
@@ -36,7 +42,7 @@ impl GaugeProof {
                 let off = observed.w[c].recip().sqrt().hypot(glued);
                 let right = log_density(reading[c] - expected[c], off);
                 let any = log_of_anything(reading[c], matching.errors.noise[c]);
-                *less = less.max((right - any).min(MOST));
+                *less += ONE_LOOK * ((right - any).clamp(0.0, MOST) - *less);
             }
         }
     }
@@ -51,7 +57,9 @@ impl Matching {
         found: &Contact,
     ) -> f64 {
         let used = self.used.clone();
-        let trusted: Vec<usize> = (0..used.len()).filter(|&c| used[c]).collect();
+        let trusted: Vec<usize> = (0..used.len())
+            .filter(|&c| used[c] && reading[c].is_finite())
+            .collect();
         let mut logs = Vec::new();
         for &c in &trusted {
             self.used[c] = false;
@@ -64,5 +72,40 @@ impl Matching {
             self.used[c] = true;
         }
         sum_of(logs.iter().copied()) - (2.0 * trusted.len() as f64).ln()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inference::ReadingErrors;
+    use crate::inference::matching::tests::{CHANNELS, maps};
+
+    #[test]
+    fn a_gauge_that_was_right_is_less_likely_odd_until_it_is_not() {
+        let [map, _] = maps();
+        let reading: Vec<f64> = map.node(1).iter().map(|g| 20.0 * g).collect();
+        let errors = ReadingErrors::of_noise(1e-7, CHANNELS);
+        let mut matching = Matching::new(map, errors, 60.0);
+        let touch = matching.find(&reading);
+        let mut proof = GaugeProof::none(CHANNELS);
+        let unproved = matching.with_an_odd_gauge(&proof, &reading, &touch);
+        for _ in 0..40 {
+            proof.learn(&matching, &reading, &touch);
+        }
+        let said = format!("{:?}", proof.less);
+        assert!(proof.less.iter().all(|less| *less > 0.9 * MOST), "{said}");
+        let proved = matching.with_an_odd_gauge(&proof, &reading, &touch);
+        assert!(proved < unproved - 1.0, "{proved} {unproved}");
+        // One begins to read half as much again.
+        let mut lying = reading;
+        lying[2] *= 1.5;
+        for _ in 0..40 {
+            proof.learn(&matching, &lying, &touch);
+        }
+        let said = format!("{:?}", proof.less);
+        assert!(proof.less[2] < 0.1 && proof.less[1] > 0.9 * MOST, "{said}");
+        proof.forget();
+        assert_eq!(proof.less, [0.0; CHANNELS]);
     }
 }

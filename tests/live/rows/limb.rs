@@ -77,7 +77,7 @@ impl Limb {
         Some(project.with_extension("npz")).filter(|arrays| arrays.exists())
     }
 
-    /// A folder from which its project finds its mesh, and is not found by others.
+    /// A folder of its own, from which its project finds its mesh.
     pub fn folder(&self) -> tempfile::TempDir {
         if let Self::Other(project) = self {
             return tempfile::tempdir_in(project.ancestors().nth(2).unwrap()).unwrap();
