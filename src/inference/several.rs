@@ -24,7 +24,6 @@ use self::spot::{RADII, Spot};
 use super::matching::modes::{stand_ins, widest};
 use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
-use crate::inference::deviation::TouchDoubts;
 use crate::inference::map::ResponseMap;
 use crate::inference::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
@@ -314,7 +313,7 @@ impl Matching {
         let starts = starts.chain([(at, found.force)]);
         Answers::of(
             &self.map,
-            starts.filter_map(|(at, force)| self.joined(observed, &[point(at, force)], None)),
+            starts.filter_map(|(at, force)| self.joined(observed, &[Spot::point(at, force)], None)),
         )
     }
 
@@ -434,15 +433,6 @@ fn are_the_same(map: &ResponseMap, one: &Joint, other: &Joint) -> bool {
 
 fn places_of(spots: &[Spot]) -> Vec<SurfacePoint> {
     spots.iter().map(|spot| spot.at).collect()
-}
-
-fn point(at: SurfacePoint, force: f64) -> Spot {
-    Spot {
-        at,
-        force,
-        radius: None,
-        about: TouchDoubts::default(),
-    }
 }
 
 /// Covariance of a spot's place in its plane (m²).

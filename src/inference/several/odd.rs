@@ -1,8 +1,8 @@
 //! One gauge may say something else than it feels. That is held against several touches; less so of one that was right lately.
 
 use super::density::{log_density, log_of_anything, sum_of};
-use super::{Contact, Matching, SeveralTouches};
 use crate::inference::matching::weighed::Observation;
+use crate::inference::matching::{Contact, Matching};
 
 /// Deviation of what a dead gauge reads, over its noise.
 const AT_REST: f64 = 4.0;
@@ -19,12 +19,14 @@ pub(super) struct GaugeProof {
 }
 
 impl GaugeProof {
+    /// Nothing is proved.
     pub fn none(gauges: usize) -> Self {
         Self {
             less: vec![0.0; gauges],
         }
     }
 
+    /// Nothing is proved any more.
     pub fn forget(&mut self) {
         self.less.fill(0.0);
     }
@@ -33,14 +35,14 @@ impl GaugeProof {
     /// that reads anything.
     pub fn learn(&mut self, matching: &Matching, reading: &[f64], one: &Contact) {
         let observed = Observation::new(reading, &matching.errors, &matching.used);
-        let expected = matching.reading_of_all(&SeveralTouches::one(*one, 1.0));
         let at = matching.map.mesh.index().nearest(one.position).0;
+        let of_newton = matching.slope(&one.about(), at).reading;
         let glued = (matching.errors.deviations.as_ref()).map(|d| d.own.at(at));
         for (c, less) in self.less.iter_mut().enumerate() {
             if observed.w[c] > 0.0 {
                 let glued = glued.as_ref().map_or(0.0, |own| own[c] * one.force);
                 let off = observed.w[c].recip().sqrt().hypot(glued);
-                let right = log_density(reading[c] - expected[c], off);
+                let right = log_density(reading[c] - one.force * of_newton[c], off);
                 let any = log_of_anything(reading[c], matching.errors.noise[c]);
                 *less += ONE_LOOK * ((right - any).clamp(0.0, MOST) - *less);
             }

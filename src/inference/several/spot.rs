@@ -36,6 +36,16 @@ pub(super) struct Felt {
 }
 
 impl Spot {
+    /// A point that is pressed as hard as that (N).
+    pub fn point(at: SurfacePoint, force: f64) -> Self {
+        Self {
+            at,
+            force,
+            radius: None,
+            about: TouchDoubts::default(),
+        }
+    }
+
     /// Unknowns that it has beside its force.
     pub fn places(&self) -> usize {
         2 + usize::from(self.radius.is_some())
