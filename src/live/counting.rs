@@ -8,7 +8,7 @@ use crate::units;
 const SETTLED_S: f64 = 0.2;
 const UNSETTLED_S: f64 = 0.05;
 /// What is shown is given up when it is less likely than this in so many looks in a row.
-const DOUBTED: f64 = 0.3;
+const DOUBTED: f64 = 0.1;
 const LOOKS: u32 = 2;
 /// A touch that is as likely the only one proves gauges.
 const PROVED: f64 = 0.95;

@@ -4,7 +4,7 @@
 pub(super) const BEGINS: u32 = 3;
 const ENDS: u32 = 6;
 /// Of the squares that a touch usually has: what is less is hardly the same touch; and the share of a sample in these.
-const GONE: f64 = 0.25;
+const GONE: f64 = 0.4;
 const USUAL: f64 = 0.01;
 /// Seconds after which what no touch explains may be what one has left behind. A finger that comes to another is found sooner.
 const STRANGE_S: f64 = 0.2;
