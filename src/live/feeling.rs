@@ -110,13 +110,13 @@ mod tests {
         let ended = |turns: &[Turn]| turns.iter().position(|t| *t == Turn::Ends);
         // As much as before, and as little in doubt.
         assert_eq!(ended(&turns([180.0, 12.0], true, 100)), None);
-        let left = turns([70.0, 7.0], false, 100);
+        let left = turns([100.0, 7.0], false, 100);
         assert!((20..30).contains(&ended(&left).unwrap()));
         // Too much for what was hidden.
         assert_eq!(ended(&turns([3000.0, 190.0], false, 100)), None);
         // A moment in which another finger comes.
         assert_eq!(ended(&turns([180.0, 12.0], false, 15)), None);
         // Most of it has gone.
-        assert_eq!(ended(&turns([40.0, 3.0], true, 10)), Some(5));
+        assert_eq!(ended(&turns([70.0, 3.0], true, 10)), Some(5));
     }
 }
