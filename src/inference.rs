@@ -8,6 +8,8 @@ pub mod drawn;
 pub mod map;
 pub mod matching;
 pub mod measured;
+#[cfg(test)]
+pub(crate) mod plate;
 pub mod region;
 pub mod remainder;
 pub mod several;

@@ -152,36 +152,16 @@ mod tests {
     use super::*;
     use crate::design::TaughtKnowledge;
     use crate::inference::ResponseMap;
-    use crate::mesh::TriMesh;
-
-    const SIDE: u32 = 13;
-    const CHANNELS: usize = 4;
+    use crate::inference::plate::plate;
 
     /// A plate of 60 mm with gauges at its corners, of which nothing was learned.
-    fn plate() -> Taught {
-        let points: Vec<DVec3> = (0..SIDE * SIDE)
-            .map(|k| DVec3::new(f64::from(k % SIDE), f64::from(k / SIDE), 0.0) * 5e-3)
-            .collect();
-        let squares = (0..SIDE * (SIDE - 1)).filter(|k| (k + 1) % SIDE != 0);
-        let triangles: Vec<[u32; 3]> = squares
-            .flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]])
-            .collect();
-        let (mesh, _) = TriMesh::new(&points, &triangles, 0).unwrap();
-        let p = mesh.positions();
-        let middles = mesh.edges().iter();
-        let middles = middles.map(|e| (p[e.a as usize] + p[e.b as usize]) / 2.0);
-        let nodes: Vec<DVec3> = p.iter().copied().chain(middles).collect();
+    fn taught() -> Taught {
         let corners = [[0.0, 0.0], [0.06, 0.0], [0.0, 0.06], [0.06, 0.06]];
-        let read = |p: &DVec3| {
+        let map = plate(13, 5e-3, |p| {
             corners.map(|[x, y]| 1e-5 * (-(p.x - x).hypot(p.y - y).powi(2) / 2e-3).exp())
-        };
-        let mesh = Arc::new(mesh);
-        let map = ResponseMap::of(
-            Arc::clone(&mesh),
-            CHANNELS,
-            nodes.iter().flat_map(read).collect(),
-        );
-        let own = ResponseMap::of(mesh, CHANNELS, vec![0.0; nodes.len() * CHANNELS]);
+        });
+        let nothing = vec![0.0; map.values().len()];
+        let own = ResponseMap::of(Arc::clone(&map.mesh), map.channels(), nothing);
         Taught {
             map: Arc::new(map),
             own: Arc::new(own),
@@ -203,7 +183,7 @@ mod tests {
 
     #[test]
     fn what_was_pressed_is_not_pressed_again_and_presses_keep_apart() {
-        let taught = plate();
+        let taught = taught();
         let places = taught.map.mesh.positions().to_vec();
         let half: Vec<DVec3> = places.iter().copied().filter(|p| p.x < 0.03).collect();
         let chosen = most_telling(&taught, &places, &half, 8, 20.0);
@@ -220,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_place_that_the_map_finds_badly_is_pressed_first() {
-        let taught = plate();
+        let taught = taught();
         // Beside a gauge, and where all of them feel little of each other.
         let places = [DVec3::new(0.005, 0.005, 0.0), DVec3::new(0.03, 0.03, 0.0)];
         let settings = settings(&taught);

@@ -300,7 +300,7 @@ fn shapes([a, b, c]: [f64; 3]) -> [f64; 6] {
 }
 
 /// Vertices, then the middles of the edges.
-fn nodes(mesh: &TriMesh) -> Vec<DVec3> {
+pub(super) fn nodes(mesh: &TriMesh) -> Vec<DVec3> {
     let p = mesh.positions();
     let middles = mesh
         .edges()

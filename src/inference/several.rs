@@ -34,6 +34,8 @@ const TWO: f64 = 0.06;
 const THREE: f64 = 0.01;
 const AREA: f64 = 0.03;
 const ODD_GAUGE: f64 = 0.01;
+/// That the model is worse where one of the gauges is than it says.
+const WORSE_GAUGE: f64 = 0.1;
 const UNCLEAR: f64 = 0.01;
 const PULL: f64 = 0.01;
 /// Several touches leave no more than this share of what a pull leaves that they are taken for.
@@ -196,12 +198,12 @@ impl Matching {
         let several = self.more_than_one(&observed, (coarse, &whitened), &alone);
         let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
         let rival = several.iter().fold(nothing, |most, s| most.max(s.0));
-        let odd = if rival > first {
-            ODD_GAUGE.ln() + self.with_an_odd_gauge(proof, reading, one)
+        let ones = if rival > first {
+            let [odd, worse] = self.with_one_gauge_off(proof, reading, one);
+            sum_of([first, ODD_GAUGE.ln() + odd, WORSE_GAUGE.ln() + worse].into_iter())
         } else {
-            f64::NEG_INFINITY
+            first
         };
-        let ones = sum_of([first, odd].into_iter());
         let [two, three, area] = &several;
         let logs = [ones, two.0, three.0, area.0, nothing];
         let all = sum_of(logs.into_iter());
@@ -308,13 +310,12 @@ impl Matching {
     fn alone(&mut self, observed: &Observation, found: &Contact) -> Answers {
         self.score(observed);
         let modes = self.modes(observed);
-        let starts = modes.iter().map(|mode| (mode.at, mode.force));
         let at = self.map.mesh.index().nearest(found.position).0;
-        let starts = starts.chain([(at, found.force)]);
-        Answers::of(
-            &self.map,
-            starts.filter_map(|(at, force)| self.joined(observed, &[Spot::point(at, force)], None)),
-        )
+        let starts = modes
+            .iter()
+            .map(|mode| vec![Spot::point(mode.at, mode.force)]);
+        let starts: Vec<_> = starts.chain([vec![Spot::point(at, found.force)]]).collect();
+        self.joined_from(observed, starts.iter())
     }
 
     /// From the best pairs of a coarse share of the map, and from where one alone may be.

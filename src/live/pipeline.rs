@@ -22,6 +22,9 @@ use crate::learning::TouchEstimator;
 use crate::units;
 use crate::wire::Hello;
 
+#[cfg(test)]
+mod tests;
+
 /// Samples, and seconds, between two searches everywhere: whichever is more.
 const SEARCH_EVERY: u32 = 20;
 const SEARCH_EVERY_S: f64 = 0.02;
@@ -196,6 +199,7 @@ impl Pipeline {
         if !self.hello.as_ref().is_some_and(same) {
             // What was read before, of lines for instance, is none of it.
             (self.ground.rest, self.taring) = (None, None);
+            self.counting.begin_anew();
         }
         self.settings.chain = self.settings.chain.of_board(hello);
         self.hello = Some(hello.clone());

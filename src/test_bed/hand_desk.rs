@@ -326,6 +326,29 @@ mod tests {
     }
 
     #[test]
+    fn a_press_that_is_held_while_its_place_is_skipped_is_not_the_next_ones() {
+        for has_sensor in [false, true] {
+            let (plan, home) = (plan(has_sensor), tempfile::tempdir().unwrap());
+            let mut desk = desk(&plan, home.path(), false);
+            press(&mut desk);
+            assert!(say(&mut desk, HandOrder::Skip).is_empty());
+            assert_eq!(desk.at, 1);
+            // It goes on to stand still, and is let go.
+            assert!(hear(&mut desk, HandNews::Read).is_empty());
+            assert!(hear(&mut desk, over()).is_empty());
+            assert!(desk.over.is_none() && desk.taken == 0);
+            // What comes then is of the next place: with a sensor that is all, without one it is asked how hard it was.
+            assert_eq!(hear(&mut desk, HandNews::Read), [HandSays::LetGo]);
+            let said = hear(&mut desk, over());
+            if has_sensor {
+                assert_eq!(said, [HandSays::Taken(2, None)]);
+            } else {
+                assert_eq!(said, [HandSays::HowHard]);
+            }
+        }
+    }
+
+    #[test]
     fn it_stops_and_moves_while_a_press_whose_force_is_known_is_held() {
         let (plan, home) = (plan(false), tempfile::tempdir().unwrap());
         let mut desk = desk(&plan, home.path(), false);

@@ -231,12 +231,14 @@ fn presses_say_how_stiff_and_how_thick_the_part_is_and_how_it_is_held() {
     let gain = gains.iter().sum::<f64>() / gains.len() as f64;
     assert!(gains.len() == 10 && (gain - 1.0).abs() < 0.03, "{gains:?}");
 
-    // Feet on rubber.
-    let loose = drawn.replace("[[support]]\n", "[[support]]\nbedding_n_per_mm3 = 3.0\n");
-    let found = fitted("loose", &loose, "supports");
+    // The same on feet of rubber: which of both it is shows in where gauges are off.
+    let loose = soft.replace("[[support]]\n", "[[support]]\nbedding_n_per_mm3 = 3.0\n");
+    let found = fitted("loose", &loose, "stiffness,supports");
+    let modulus = within(&found["youngs_modulus_gpa"], 1.2, 0.05);
+    assert_eq!(saved("youngs_modulus_gpa"), [modulus]);
     let bedding = within(&found["bedding_n_per_mm3"], 3.0, 0.2);
     assert_eq!(saved("bedding_n_per_mm3"), [bedding; 4]);
-    // The same feet, screwed to steel.
+    // Feet that are screwed to steel.
     let found = fitted("firm", &drawn, "supports");
     assert_eq!(found["bedding_n_per_mm3"], "firm");
     assert_eq!(saved("bedding_n_per_mm3"), [0.0; 0]);

@@ -158,6 +158,33 @@ fn two_fingers_are_two_and_the_next_one_is_one() {
     );
 }
 
+/// Where elements leave much of what one gauge reads a second touch would explain it.
+#[test]
+fn one_finger_is_never_two() {
+    let of_force = |places: &[DVec3]| {
+        let mut presses = in_turn(3.0, 1.2, 0.6, places, 8.0);
+        for (k, press) in presses.iter_mut().enumerate() {
+            press.force = [2.0, 8.0, 20.0, 30.0][k % 4];
+        }
+        presses
+    };
+    let mut benches = vec![Bench::of(of_force(&places(40)))];
+    if other_limb().is_none() {
+        let places = places_on("barrel", 40);
+        benches.push(Bench::on_bundled("barrel", of_force(&places)));
+    }
+    for bench in benches {
+        let (heard, _) = listen(&bench.record(&BOARD), &bench.exact("0.0"));
+        let is_one = |h: &Heard| h.kind.as_deref() == Some("points") && h.touches.len() == 1;
+        let all = bench.full(&heard).count() as f64;
+        let one = bench.full(&heard).filter(|(_, h)| is_one(h)).count() as f64;
+        let ((off, _), ghosts) = (bench.off(&heard), bench.ghosts(&heard, 0.0));
+        let share = one / all;
+        println!("{share:.3} are one, {off:.2} mm off, {ghosts} ghosts");
+        hold(share > 0.99 && ghosts == 0, "one in 99 %, and no ghosts");
+    }
+}
+
 #[test]
 fn a_standing_touch_outlives_a_drift_and_light_ones_are_felt_under_it() {
     let places = places(20);

@@ -61,6 +61,21 @@ impl ReadingErrors {
         dragging.map_or(0.0, |n| n.making.along_either())
     }
 
+    /// The same, of one channel so many times what they are for this reading.
+    pub(in crate::inference) fn worse_at(
+        &self,
+        channel: usize,
+        times: f64,
+        reading: &[f64],
+        used: &[bool],
+    ) -> Self {
+        let mut worse = self.clone();
+        let variance = self.weights(reading, used)[channel].recip();
+        worse.noise[channel] =
+            worse.noise[channel].hypot(((times * times - 1.0) * variance).sqrt());
+        worse
+    }
+
     /// One over the variance of every channel for this reading; zero for a channel that is left out.
     #[must_use]
     pub fn weights(&self, reading: &[f64], used: &[bool]) -> Vec<f64> {

@@ -149,8 +149,8 @@ mod tests {
     use super::super::ReadingErrors;
     use super::super::tests::{CHANNELS, maps};
     use super::*;
-    use crate::inference::{Deviations, ResponseMap};
-    use crate::mesh::TriMesh;
+    use crate::inference::Deviations;
+    use crate::inference::plate::plate;
 
     /// What a touch at a template explains, in double precision and one by one.
     fn explained(matching: &Matching, observed: &Observation, node: usize) -> f64 {
@@ -167,28 +167,16 @@ mod tests {
 
     #[test]
     fn where_nothing_is_known_a_share_of_the_templates_says_what_all_say() {
-        const SIDE: u32 = 150;
-        let points: Vec<DVec3> = (0..SIDE * SIDE)
-            .map(|k| DVec3::new(f64::from(k % SIDE), f64::from(k / SIDE), 0.0) * 1e-3)
-            .collect();
-        let squares = (0..SIDE * (SIDE - 1)).filter(|k| (k + 1) % SIDE != 0);
-        let triangles: Vec<[u32; 3]> = squares
-            .flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]])
-            .collect();
-        let (mesh, _) = TriMesh::new(&points, &triangles, 0).unwrap();
-        let mesh = Arc::new(mesh);
-        // By Euler's formula as many edges as this.
-        let nodes = points.len() + (points.len() + triangles.len() - 1);
-        let map = ResponseMap::of(Arc::clone(&mesh), CHANNELS, vec![0.0; nodes * CHANNELS]);
+        let map = Arc::new(plate(150, 1e-3, |_| [0.0; CHANNELS]));
         let errors = ReadingErrors::of_noise(1e-6, CHANNELS);
-        let mut matching = Matching::new(Arc::new(map), errors, 50.0);
+        let mut matching = Matching::new(Arc::clone(&map), errors, 50.0);
         let observed = Observation::new(&[0.0; CHANNELS], &matching.errors, &matching.used);
         matching.score(&observed);
-        let start = mesh.index().nearest(points[0]).0;
+        let start = map.mesh.vertex_point(0);
         let best = matching.follow(&observed, start, None);
         let said = matching.mean_of_templates(&observed, &best);
         let middle = DVec3::new(74.5e-3, 74.5e-3, 0.0);
-        assert!(points.len() > 4 * LOOKED_AT);
+        assert!(map.places.len() > 4 * LOOKED_AT);
         assert!(said.position.distance(middle) < 1e-3, "{}", said.position);
     }
 

@@ -2,7 +2,7 @@ use glam::DVec2;
 
 use super::*;
 use crate::budget::unwatched;
-use crate::mesh::TriMesh;
+use crate::inference::plate::plate;
 
 const SIDE: u32 = 30;
 const CHANNELS: usize = 3;
@@ -10,22 +10,8 @@ const CHANNELS: usize = 3;
 const STEP: f64 = 2e-3;
 
 /// A plate of 58 mm, and what three gauges read on it of a newton: as far as the model knows, and in truth.
-fn plate(truth: bool) -> ResponseMap {
-    let points: Vec<DVec3> = (0..SIDE * SIDE)
-        .map(|k| DVec3::new(f64::from(k % SIDE), f64::from(k / SIDE), 0.0) * STEP)
-        .collect();
-    let squares = (0..SIDE * (SIDE - 1)).filter(|k| (k + 1) % SIDE != 0);
-    let triangles: Vec<[u32; 3]> = squares
-        .flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]])
-        .collect();
-    let (mesh, _) = TriMesh::new(&points, &triangles, 0).unwrap();
-    let p = mesh.positions();
-    let middles = mesh.edges().iter();
-    let middles = middles.map(|e| (p[e.a as usize] + p[e.b as usize]) / 2.0);
-    let nodes: Vec<DVec3> = p.iter().copied().chain(middles).collect();
-    let values = nodes.iter().flat_map(|p| read(p.truncate(), truth));
-    let values = values.collect();
-    ResponseMap::of(Arc::new(mesh), CHANNELS, values)
+fn of_plate(truth: bool) -> ResponseMap {
+    plate(SIDE, STEP, |p| read(p.truncate(), truth))
 }
 
 fn read(p: DVec2, truth: bool) -> [f64; CHANNELS] {
@@ -65,7 +51,7 @@ fn off(map: &ResponseMap, deviation: &ResponseMap, truth: &ResponseMap) -> [f64;
 }
 
 fn learned(known: &[KnownPress]) -> ([ResponseMap; 2], RemainderSettings) {
-    let model = plate(false);
+    let model = of_plate(false);
     let nothing = vec![0.0; model.values().len()];
     let none = ResponseMap::of(Arc::clone(&model.mesh), CHANNELS, nothing);
     let remainder = Remainder::learn(&model, known, &[1e-7; CHANNELS], &unwatched)
@@ -77,7 +63,7 @@ fn learned(known: &[KnownPress]) -> ([ResponseMap; 2], RemainderSettings) {
 
 #[test]
 fn the_more_presses_the_nearer_the_map_is_to_what_was_pressed_and_it_says_how_near() {
-    let (model, truth) = (plate(false), plate(true));
+    let (model, truth) = (of_plate(false), of_plate(true));
     let same = ResponseMap::of(
         Arc::clone(&model.mesh),
         CHANNELS,
@@ -99,7 +85,7 @@ fn the_more_presses_the_nearer_the_map_is_to_what_was_pressed_and_it_says_how_ne
 
 #[test]
 fn a_model_that_is_right_stays_as_it_is() {
-    let model = plate(false);
+    let model = of_plate(false);
     let ([map, deviation], settings) = learned(&presses(&model, 100));
     let [left, _] = off(&map, &deviation, &model);
     assert!(
@@ -110,14 +96,14 @@ fn a_model_that_is_right_stays_as_it_is() {
 
 #[test]
 fn a_channel_that_was_not_read_says_nothing_and_the_others_what_they_said() {
-    let truth = plate(true);
+    let truth = of_plate(true);
     let all = presses(&truth, 80);
     let mut without = all.clone();
     for press in &mut without {
         press.reading[1] = f64::NAN;
     }
     let ([map, deviation], _) = learned(&without);
-    let model = plate(false);
+    let model = of_plate(false);
     let column = |m: &ResponseMap, c: usize| -> Vec<f64> {
         m.values()
             .iter()
@@ -147,7 +133,7 @@ fn a_channel_that_was_not_read_says_nothing_and_the_others_what_they_said() {
 
 #[test]
 fn many_depths_at_a_place_are_one_press_of_them_all() {
-    let truth = plate(true);
+    let truth = of_plate(true);
     let once = presses(&truth, 60);
     let twice: Vec<KnownPress> = (once.iter())
         .flat_map(|k| {
@@ -167,7 +153,7 @@ fn many_depths_at_a_place_are_one_press_of_them_all() {
 
 #[test]
 fn the_bytes_do_not_depend_on_the_threads() {
-    let truth = plate(true);
+    let truth = of_plate(true);
     let known = presses(&truth, 50);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);

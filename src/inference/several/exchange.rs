@@ -315,51 +315,13 @@ wide! {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::inference::ReadingErrors;
-    use crate::mesh::TriMesh;
-
-    const SIDE: u32 = 30;
-    const CHANNELS: usize = 8;
-
-    /// A plate whose gauges feel what is near them, one way on one side and the other way on the other.
-    fn plate() -> ResponseMap {
-        let points: Vec<DVec3> = (0..SIDE * SIDE)
-            .map(|k| DVec3::new(f64::from(k % SIDE), f64::from(k / SIDE), 0.0) * 2e-3)
-            .collect();
-        let squares = (0..SIDE * (SIDE - 1)).filter(|k| (k + 1) % SIDE != 0);
-        let triangles: Vec<[u32; 3]> = squares
-            .flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]])
-            .collect();
-        let (mesh, _) = TriMesh::new(&points, &triangles, 0).unwrap();
-        let nodes = points.len() + (points.len() + triangles.len() - 1);
-        let gauge = |c: usize| {
-            let turn = 0.61 * std::f64::consts::TAU * c as f64;
-            DVec3::new(29e-3 + 20e-3 * turn.cos(), 29e-3 + 20e-3 * turn.sin(), 0.0)
-        };
-        let felt = |place: DVec3, c: usize| {
-            let off = (place - gauge(c)) / 9e-3;
-            20e-6 * (off.x + 0.4) * (-off.length()).exp()
-        };
-        let mut values = vec![0.0; nodes * CHANNELS];
-        for (k, place) in points.iter().enumerate() {
-            for c in 0..CHANNELS {
-                values[k * CHANNELS + c] = felt(*place, c);
-            }
-        }
-        ResponseMap::of(Arc::new(mesh), CHANNELS, values)
-    }
-
-    fn read(map: &ResponseMap, touches: &[(usize, f64)]) -> Vec<f64> {
-        let of = |c: usize| touches.iter().map(|&(node, f)| f * map.node(node)[c]).sum();
-        (0..CHANNELS).map(of).collect()
-    }
+    use crate::inference::plate::{CHANNELS, gauged_plate, read_touches};
 
     #[test]
     fn the_inner_loop_finds_what_trying_all_finds() {
-        let map = plate();
+        let map = gauged_plate();
         let errors = ReadingErrors {
             drift: 2e-6,
             ..ReadingErrors::of_noise(1e-6, CHANNELS)
@@ -368,7 +330,7 @@ mod tests {
             vec![(95, 8.0), (610, 12.0)],
             vec![(95, 8.0), (610, 12.0), (772, 9.0)],
         ] {
-            let reading = read(&map, &touches);
+            let reading = read_touches(&map, &touches);
             let observed = Observation::new(&reading, &errors, &[true; CHANNELS]);
             let exchange = Exchange::new(&map, &observed, 0.05, 60.0);
             let at = |node: usize| exchange.place(map.mesh.vertex_point(node));
@@ -398,9 +360,9 @@ mod tests {
 
     #[test]
     fn spots_go_to_where_they_are_from_far_away() {
-        let map = plate();
+        let map = gauged_plate();
         let touches = [(95, 8.0), (610, 12.0)];
-        let reading = read(&map, &touches);
+        let reading = read_touches(&map, &touches);
         let errors = ReadingErrors::of_noise(1e-6, CHANNELS);
         let observed = Observation::new(&reading, &errors, &[true; CHANNELS]);
         let exchange = Exchange::new(&map, &observed, 0.0, 60.0);

@@ -11,6 +11,9 @@ const AT_REST: f64 = 4.0;
 const MOST: f64 = 4.6;
 const ONE_LOOK: f64 = 0.1;
 
+/// How much worse the model of a gauge may be than it says: it says a mean over all of them.
+const WORSE: f64 = 4.0;
+
 /// What touches before have proved of gauges.
 #[derive(Clone)]
 pub(super) struct GaugeProof {
@@ -51,37 +54,45 @@ impl GaugeProof {
 }
 
 impl Matching {
-    /// Logarithm of the density where one gauge reads nothing, or anything, and one point touches.
-    pub(super) fn with_an_odd_gauge(
+    /// Logarithms of the density of one point where a gauge reads nothing, or anything; and where the model of one is worse than
+    /// it says.
+    pub(super) fn with_one_gauge_off(
         &mut self,
         proof: &GaugeProof,
         reading: &[f64],
         found: &Contact,
-    ) -> f64 {
+    ) -> [f64; 2] {
         let used = self.used.clone();
         let trusted: Vec<usize> = (0..used.len())
             .filter(|&c| used[c] && reading[c].is_finite())
             .collect();
-        let mut logs = Vec::new();
+        let (mut odd, mut worse) = (Vec::new(), Vec::new());
         for &c in &trusted {
             self.used[c] = false;
             let without = self.used.clone();
             let observed = Observation::new(reading, &self.errors, &without);
-            let others = self.alone(&observed, found).log_evidence();
-            let noise = self.errors.noise[c];
-            logs.push(others + log_density(reading[c], AT_REST * noise));
-            logs.push(others + log_of_anything(reading[c], noise) - proof.less[c]);
+            let others = self.alone(&observed, found);
             self.used[c] = true;
+            let (log, noise) = (others.log_evidence(), self.errors.noise[c]);
+            odd.push(log + log_density(reading[c], AT_REST * noise));
+            odd.push(log + log_of_anything(reading[c], noise) - proof.less[c]);
+            let errors = self.errors.worse_at(c, WORSE, reading, &used);
+            let observed = Observation::new(reading, &errors, &used);
+            let answers = self.joined_from(&observed, others.0.iter().map(|one| &one.spots));
+            worse.push(answers.log_evidence() - proof.less[c]);
         }
-        sum_of(logs.iter().copied()) - (2.0 * trusted.len() as f64).ln()
+        [odd, worse].map(|logs| sum_of(logs.iter().copied()) - (logs.len() as f64).ln())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::inference::ReadingErrors;
     use crate::inference::matching::tests::{CHANNELS, maps};
+    use crate::inference::plate::{gauged_plate, read_touches};
+    use crate::inference::{ReadingErrors, Several};
 
     #[test]
     fn a_gauge_that_was_right_is_less_likely_odd_until_it_is_not() {
@@ -91,13 +102,13 @@ mod tests {
         let mut matching = Matching::new(map, errors, 60.0);
         let touch = matching.find(&reading);
         let mut proof = GaugeProof::none(CHANNELS);
-        let unproved = matching.with_an_odd_gauge(&proof, &reading, &touch);
+        let [unproved, _] = matching.with_one_gauge_off(&proof, &reading, &touch);
         for _ in 0..40 {
             proof.learn(&matching, &reading, &touch);
         }
         let said = format!("{:?}", proof.less);
         assert!(proof.less.iter().all(|less| *less > 0.9 * MOST), "{said}");
-        let proved = matching.with_an_odd_gauge(&proof, &reading, &touch);
+        let [proved, _] = matching.with_one_gauge_off(&proof, &reading, &touch);
         assert!(proved < unproved - 1.0, "{proved} {unproved}");
         // One begins to read half as much again.
         let mut lying = reading;
@@ -109,5 +120,42 @@ mod tests {
         assert!(proof.less[2] < 0.1 && proof.less[1] > 0.9 * MOST, "{said}");
         proof.forget();
         assert_eq!(proof.less, [0.0; CHANNELS]);
+    }
+    fn plate(relative: f64) -> (Matching, Several) {
+        let errors = ReadingErrors {
+            relative,
+            ..ReadingErrors::of_noise(1e-6, 8)
+        };
+        let matching = Matching::new(Arc::new(gauged_plate()), errors, 60.0);
+        let several = Several::new(&matching);
+        (matching, several)
+    }
+
+    #[test]
+    fn one_touch_of_which_the_model_is_off_at_a_gauge_is_one() {
+        let (mut matching, several) = plate(0.02);
+        let reading = read_touches(&matching.map, &[(340, 20.0)]);
+        let root = (reading.iter().map(|x| x * x).sum::<f64>() / 8.0).sqrt();
+        for (gauge, by) in (0..8).flat_map(|c| [0.1, 0.15].map(|by| (c, by))) {
+            let mut off = reading.clone();
+            off[gauge] += by * root;
+            let one = matching.find(&off);
+            let seen = matching.count(&several, &off, &one);
+            let said = format!("{gauge} {by} {seen:?}");
+            assert!(seen.count() == Some(1) && seen.probability > 0.7, "{said}");
+        }
+    }
+
+    #[test]
+    fn what_no_single_touch_explains_is_not_one() {
+        let (mut matching, several) = plate(0.02);
+        // All the other way.
+        let reading = read_touches(&matching.map, &[(340, 20.0)])
+            .iter()
+            .map(|x| -x)
+            .collect::<Vec<_>>();
+        let one = matching.find(&reading);
+        let seen = matching.count(&several, &reading, &one);
+        assert_ne!(seen.count(), Some(1), "{seen:?}");
     }
 }
