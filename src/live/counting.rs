@@ -4,8 +4,10 @@
 use crate::inference::{Contact, Matching, Several, SeveralTouches};
 use crate::units;
 
-/// Seconds between looks: while what is shown is what was seen, and while it is not.
+/// Seconds between looks: while what is shown is what was seen, and while it is not. Of several that were seen again and again
+/// up to so many: to look at them costs thirty times what it costs to look at one, and what comes or goes unsettles them.
 const SETTLED_S: f64 = 0.2;
+const LONG_SETTLED_S: f64 = 0.8;
 const UNSETTLED_S: f64 = 0.05;
 /// What is shown is given up when it is less likely than this in so many looks in a row.
 const DOUBTED: f64 = 0.1;
@@ -29,6 +31,8 @@ pub(super) struct Counting {
     /// Looks in a row that doubted it.
     doubted: u32,
     last_look: Option<u64>,
+    /// Seconds until the next, while it is settled.
+    settled_s: f64,
     sure_of_one: f64,
     /// Weighted squares up to which a sample is of what the last look saw.
     usual: f64,
@@ -51,6 +55,7 @@ impl Counting {
             shown: None,
             doubted: 0,
             last_look: None,
+            settled_s: SETTLED_S,
             sure_of_one: 1.0,
             usual: 0.0,
             felt: 0.0,
@@ -66,7 +71,7 @@ impl Counting {
     /// Nothing touches any more, or something else does.
     pub fn end(&mut self) {
         (self.shown, self.last_look) = (None, None);
-        (self.doubted, self.usual) = (0, 0.0);
+        (self.doubted, self.usual, self.settled_s) = (0, 0.0, SETTLED_S);
     }
 
     /// The touches that go on, where they are more than one point, and whether they explain this sample (strain).
@@ -110,7 +115,7 @@ impl Counting {
     /// Whether it is time to look again at touches that leave so much unexplained.
     pub fn is_due(&self, time_us: u64, unexplained: f64) -> bool {
         let wait = if self.is_settled(unexplained) {
-            SETTLED_S
+            self.settled_s
         } else {
             UNSETTLED_S
         };
@@ -132,6 +137,12 @@ impl Counting {
             self.several.learn(matching, strain, one);
         }
         let shown = self.shown.as_ref().unwrap_or(&point);
+        let again = self.shown.is_some() && seen.alike(shown);
+        self.settled_s = if again {
+            (2.0 * self.settled_s).min(LONG_SETTLED_S)
+        } else {
+            SETTLED_S
+        };
         let share = seen.share_of(shown);
         self.doubted = if share < DOUBTED { self.doubted + 1 } else { 0 };
         if seen.alike(shown) || self.doubted >= LOOKS {
