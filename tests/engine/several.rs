@@ -163,16 +163,26 @@ fn three_fingers_are_more_than_one() {
     assert!(right >= 30 && one <= 3);
 }
 
-/// What a palm of a radius (m) around a place reads, with a total force (N): H. Hertz's pressure, point by point.
-fn read_palm(centre: DVec3, radius: f64, force: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+/// What a palm of a radius (m) around a place reads, with a total force (N): H. Hertz's pressure, point by point, and so much
+/// more on one side, over it, as there is less on the other.
+fn read_palm(
+    centre: DVec3,
+    (radius, leans): (f64, f64),
+    force: f64,
+    rng: &mut ChaCha8Rng,
+) -> Vec<f64> {
     let mesh = &lab().sensing.drawn.map.mesh;
     let (at, _) = mesh.index().nearest(centre);
     let (centre, facing) = (mesh.point(at), mesh.normal(at));
-    let of = |at| Touch {
-        position: mesh.point(at),
-        normal: mesh.normal(at),
-        force: (1.0 - mesh.point(at).distance_squared(centre) / (radius * radius)).sqrt(),
-        tip_radius: 2e-3,
+    let side = facing.any_orthonormal_vector();
+    let of = |at| {
+        let off = (mesh.point(at) - centre) / radius;
+        Touch {
+            position: mesh.point(at),
+            normal: mesh.normal(at),
+            force: (1.0 - off.length_squared()).sqrt() * (1.0 + leans * off.dot(side)),
+            tip_radius: 2e-3,
+        }
     };
     let inside = |at| mesh.point(at).distance(centre) < radius && mesh.normal(at).dot(facing) > 0.0;
     let parts: Vec<Touch> = even(mesh, 200, 3, inside).into_iter().map(of).collect();
@@ -191,11 +201,11 @@ fn a_palm_is_an_area() {
     let (mut matching, several) = estimator();
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut all = Vec::new();
-    for radius in [15e-3, 25e-3] {
+    for (radius, leans) in [(15e-3, 0.0), (25e-3, 0.0), (25e-3, 0.7)] {
         let (mut seen, mut points, mut far, mut off) = (0, 0, 0.0, 0.0);
         let places = touches(40, 31, 1.0);
         for touch in &places {
-            let reading = read_palm(touch.position, radius, 25.0, &mut rng);
+            let reading = read_palm(touch.position, (radius, leans), 25.0, &mut rng);
             let found = count(&mut matching, &several, &reading);
             if let (TouchKind::Area(_), [contact]) = (found.kind, &found.contacts[..]) {
                 seen += 1;
@@ -213,12 +223,14 @@ fn a_palm_is_an_area() {
         }
         let count = f64::from(seen);
         println!(
-            "radius {radius}: {seen} of {} are areas, {points} points; {:.2} mm, {:.2} N off",
+            "radius {radius}, leans {leans}: {seen} of {} are areas, {points} points; {:.2} mm, {:.2} N off",
             places.len(),
             far / count,
             off / count
         );
-        all.push((seen, points, far / count, off / count));
+        // Its force is that much beside its middle, or less.
+        let beside = 1e3 * radius * leans / 5.0;
+        all.push((seen, points, far / count - beside, off / count));
     }
     for (seen, points, far, off) in all {
         assert!(seen >= 30 && points <= 8 && far < 3.0 && off < 1.5);

@@ -1,6 +1,7 @@
 //! Live touch in the real window: a simulated board from start to replay.
 #![cfg(feature = "studio")]
 
+use crate::board::start;
 use crate::window;
 
 use std::collections::BTreeMap;
@@ -14,6 +15,7 @@ use hapdef::budget::unwatched;
 use hapdef::design;
 use hapdef::link::{Address, BAUD, ConnectionState, Listener, Pace, SessionEvent};
 use hapdef::live::{LiveUpdate, Pipeline};
+use hapdef::session::Session;
 use hapdef::studio::Studio;
 
 use egui_kittest::kittest::Queryable as _;
@@ -119,6 +121,41 @@ fn recall(w: &mut Window, path: &Path) {
     w.press("Start a simulated board");
     w.wait("the touches of before", 120, |s| {
         s.session.known_touches() == presses.len()
+    });
+    another_board(w);
+}
+
+/// What one board has read of touches says nothing of what another reads, and is there again with its own.
+fn another_board(w: &mut Window) {
+    let known = w.session().known_touches();
+    let number = |s: &Session| s.live.look(|f| f.hello.as_ref().map(|h| h.board));
+    let own = number(w.session()).flatten().unwrap();
+    let other = start(&[
+        "board",
+        "--simulate",
+        "--quality",
+        "draft",
+        "--seed",
+        "5",
+        "--tcp",
+    ]);
+    let port = other.json()["port"].as_str().unwrap().to_owned();
+    w.session_mut().connect(&port);
+    w.wait("the other board", 60, |s| {
+        number(&s.session)
+            .flatten()
+            .is_some_and(|board| board != own)
+    });
+    assert_eq!(w.session().known_touches(), 0);
+    assert_eq!(
+        w.session().document.state.project.live.presses.len(),
+        known,
+        "kept for the board that read them"
+    );
+    w.press("Disconnect");
+    w.press("Start a simulated board");
+    w.wait("its own touches", 60, |s| {
+        number(&s.session).flatten() == Some(own) && s.session.known_touches() == known
     });
 }
 
