@@ -5,6 +5,7 @@
 //! reading is of nothing that is known. Two are searched for among all pairs of a coarse share of the map (`coarse`), then on all
 //! templates one beside the other (`exchange`), and followed all together (`joint`).
 
+mod answers;
 mod coarse;
 mod density;
 mod exchange;
@@ -13,8 +14,9 @@ mod leeway;
 mod odd;
 mod spot;
 
-use glam::{DMat2, DVec3};
+use glam::DVec3;
 
+use self::answers::{Answers, flat_of};
 use self::coarse::{Coarse, Whitened};
 use self::density::{of_nothing_known, sum_of};
 use self::exchange::Exchange;
@@ -24,7 +26,6 @@ use self::spot::{RADII, Spot};
 use super::matching::modes::{stand_ins, widest};
 use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
-use crate::inference::map::ResponseMap;
 use crate::inference::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
 
@@ -142,33 +143,6 @@ impl Several {
     /// Only one touch makes a reading (strain): what gauges read of it proves them.
     pub fn learn(&mut self, matching: &Matching, reading: &[f64], one: &Contact) {
         self.proof.learn(matching, reading, one);
-    }
-}
-
-/// Answers to one question, each with its own places, and the logarithm of their evidence together.
-#[derive(Default)]
-struct Answers(Vec<Joint>);
-
-impl Answers {
-    /// Of what was found from several starts, which may be the same again.
-    fn of(map: &ResponseMap, joints: impl Iterator<Item = Joint>) -> Self {
-        let mut found: Vec<Joint> = joints.collect();
-        found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        let mut apart: Vec<Joint> = Vec::with_capacity(found.len());
-        for joint in found {
-            if !apart.iter().any(|other| are_the_same(map, other, &joint)) {
-                apart.push(joint);
-            }
-        }
-        Self(apart)
-    }
-
-    fn best(&self) -> Option<&Joint> {
-        self.0.first()
-    }
-
-    fn log_evidence(&self) -> f64 {
-        sum_of(self.0.iter().map(|j| j.log_evidence))
     }
 }
 
@@ -306,18 +280,6 @@ impl Matching {
         touches.contacts.iter().map(spot).collect()
     }
 
-    /// One point: from the best places for one.
-    fn alone(&mut self, observed: &Observation, found: &Contact) -> Answers {
-        self.score(observed);
-        let modes = self.modes(observed);
-        let at = self.map.mesh.index().nearest(found.position).0;
-        let starts = modes
-            .iter()
-            .map(|mode| vec![Spot::point(mode.at, mode.force)]);
-        let starts: Vec<_> = starts.chain([vec![Spot::point(at, found.force)]]).collect();
-        self.joined_from(observed, starts.iter())
-    }
-
     /// From the best pairs of a coarse share of the map, and from where one alone may be.
     fn two(
         &self,
@@ -346,17 +308,6 @@ impl Matching {
         let starts = begun.filter_map(|two| exchange.with_one_more(&two.spots));
         let settled = exchange.settled(starts.map(|spots| places_of(&spots)), FOLLOWED);
         self.joined_from(observed, settled.iter())
-    }
-
-    fn joined_from<'a>(
-        &self,
-        observed: &Observation,
-        starts: impl Iterator<Item = &'a Vec<Spot>>,
-    ) -> Answers {
-        Answers::of(
-            &self.map,
-            starts.filter_map(|spots| self.joined(observed, spots, None)),
-        )
     }
 
     fn touches(
@@ -419,28 +370,8 @@ impl Matching {
     }
 }
 
-/// Whether the spots of both lie within what is known of one of them.
-fn are_the_same(map: &ResponseMap, one: &Joint, other: &Joint) -> bool {
-    /// Deviations, and metres that are no difference.
-    const WITHIN: f64 = 2.0;
-    const LEAST: f64 = 1e-3;
-    let place = |spot: &Spot| map.mesh.point(spot.at);
-    (0..one.spots.len()).all(|k| {
-        let wide = WITHIN * widest(flat_of(one, k)).sqrt() + LEAST;
-        let here = place(&one.spots[k]);
-        other.spots.iter().any(|s| place(s).distance(here) < wide)
-    })
-}
-
 fn places_of(spots: &[Spot]) -> Vec<SurfacePoint> {
     spots.iter().map(|spot| spot.at).collect()
-}
-
-/// Covariance of a spot's place in its plane (m²).
-fn flat_of(joint: &Joint, k: usize) -> DMat2 {
-    let first = joint.first(k);
-    let of = |i: usize, j: usize| joint.covariance[(first + i, first + j)];
-    DMat2::from_cols_array(&[of(0, 0), of(1, 0), of(0, 1), of(1, 1)])
 }
 
 /// How sure one touch is at least: whatever else there is besides would have to be found in as much room as this was,
