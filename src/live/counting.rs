@@ -156,3 +156,61 @@ impl Counting {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::inference::ReadingErrors;
+    use crate::inference::plate::{CHANNELS, gauged_plate, read_touches};
+
+    const STEP_US: u64 = 5_000;
+    const TWO: [(usize, f64); 2] = [(95, 8.0), (610, 12.0)];
+
+    /// Times of looks (s) at a reading that stands for so long, as the pipeline asks for them.
+    fn looks(
+        counting: &mut Counting,
+        matching: &mut Matching,
+        reading: &[f64],
+        times: std::ops::Range<u64>,
+    ) -> Vec<f64> {
+        let mut at = Vec::new();
+        for time_us in times.step_by(STEP_US as usize) {
+            let left = match counting.track(matching, reading) {
+                Some((touches, true)) => touches.unexplained,
+                Some((_, false)) => f64::INFINITY,
+                None => matching.find(reading).unexplained,
+            };
+            if counting.is_due(time_us, left) {
+                let one = matching.find(reading);
+                counting.look(matching, time_us, reading, &one);
+                at.push(1e-6 * time_us as f64);
+            }
+        }
+        at
+    }
+
+    #[test]
+    fn two_that_stand_are_looked_at_ever_less_and_a_third_at_once() {
+        let map = Arc::new(gauged_plate());
+        let errors = ReadingErrors::of_noise(1e-6, CHANNELS);
+        let mut matching = Matching::new(Arc::clone(&map), errors, 60.0);
+        let mut counting = Counting::new(&matching);
+        let two = read_touches(&map, &TWO);
+        let at = looks(&mut counting, &mut matching, &two, 0..5_000_000);
+        assert_eq!(counting.shown().and_then(SeveralTouches::count), Some(2));
+        let last = at.windows(2).last().map(|w| w[1] - w[0]);
+        assert!(at.len() < 11 && at[1] < 0.1, "{at:?}");
+        assert!(
+            last.is_some_and(|s| (s - LONG_SETTLED_S).abs() < 0.01),
+            "{at:?}"
+        );
+        let three = read_touches(&map, &[TWO[0], TWO[1], (772, 9.0)]);
+        let begun = 5_100_000;
+        let at = looks(&mut counting, &mut matching, &three, begun..begun + 300_000);
+        let passed = at[0] - 1e-6 * begun as f64;
+        assert!(passed < UNSETTLED_S, "{at:?}");
+        assert_ne!(counting.shown().and_then(SeveralTouches::count), Some(2));
+    }
+}

@@ -32,6 +32,7 @@ impl Answers {
         self.0.first()
     }
 
+    /// Logarithm of what all of them say together.
     pub fn log_evidence(&self) -> f64 {
         sum_of(self.0.iter().map(|j| j.log_evidence))
     }
