@@ -29,7 +29,7 @@ use super::matching::{Contact, Load, Matching};
 use crate::inference::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
 
-/// Before anything is read. A pull is none of them: it is held against them by itself.
+/// Before anything is read, over each other. A pull is none of them: it is held against them by itself.
 const ONE: f64 = 0.88;
 const TWO: f64 = 0.06;
 const THREE: f64 = 0.01;
