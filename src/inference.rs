@@ -25,5 +25,5 @@ pub use matching::{Contact, Matching, ReadingErrors};
 pub use measured::MeasuredMatching;
 pub use region::CredibleRegion;
 pub use remainder::Remainder;
-pub use several::{Several, SeveralTouches, TouchKind};
+pub use several::{Several, SeveralTouches, TouchKind, TouchesBefore, TouchesBeside};
 pub use trained::{Features, LiveLessons, TrainedLive};

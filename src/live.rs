@@ -9,6 +9,7 @@ mod feeling;
 mod ground;
 pub mod health;
 mod hum;
+mod lately;
 mod news;
 pub mod pipeline;
 mod presses;

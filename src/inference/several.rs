@@ -3,9 +3,11 @@
 //!
 //! One point, two, three, or an area; against them stands that a gauge says something else than it feels, and that the
 //! reading is of nothing that is known. Two are searched for among all pairs of a coarse share of the map (`coarse`), then on all
-//! templates one beside the other (`exchange`), and followed all together (`joint`).
+//! templates one beside the other (`exchange`), and followed all together (`joint`). Where it was seen what touched before another
+//! came, that one is told by itself (`before`).
 
 mod answers;
+mod before;
 mod coarse;
 mod density;
 mod exchange;
@@ -28,6 +30,8 @@ use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
 use crate::inference::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
+
+pub use self::before::{TouchesBefore, TouchesBeside};
 
 /// Before anything is read, over each other. A pull is none of them: it is held against them by itself.
 const ONE: f64 = 0.88;
@@ -84,12 +88,16 @@ impl SeveralTouches {
     /// How likely those of another answer are, by this one: that there are as many, of the same kind.
     #[must_use]
     pub fn share_of(&self, other: &Self) -> f64 {
-        let which = match other.kind {
-            TouchKind::Points => other.contacts.len().clamp(1, 3) - 1,
+        self.shares[other.which()]
+    }
+
+    /// Which of the shares is its own.
+    fn which(&self) -> usize {
+        match self.kind {
+            TouchKind::Points => self.contacts.len().clamp(1, 3) - 1,
             TouchKind::Area(_) => 3,
             TouchKind::Unclear => 4,
-        };
-        self.shares[which]
+        }
     }
 
     /// How many they are, where that is known.
@@ -150,6 +158,17 @@ impl Matching {
     /// How many touches make a reading (strain, a channel each), where and how hard each is. `one` is what was found
     /// where only one is looked for.
     pub fn count(&mut self, several: &Several, reading: &[f64], one: &Contact) -> SeveralTouches {
+        self.count_with_evidence(several, reading, one).0
+    }
+
+    /// As [`Self::count`], and the logarithm of the reading's density over all that may touch; nothing where it is too light, or
+    /// gauges are too few, to tell.
+    fn count_with_evidence(
+        &mut self,
+        several: &Several,
+        reading: &[f64],
+        one: &Contact,
+    ) -> (SeveralTouches, Option<f64>) {
         let used = self.used.clone();
         let observed = Observation::new(reading, &self.errors, &used);
         let channels = observed.w.iter().filter(|w| **w > 0.0).count();
@@ -162,12 +181,14 @@ impl Matching {
             // A single one would have to pull.
             None => 0.0,
         };
+        let only_one = SeveralTouches::one(*one, sure);
+        let is_told = channels >= LEAST_CHANNELS && first.is_finite();
         if channels < LEAST_CHANNELS || sure >= SURE {
-            return SeveralTouches::one(*one, sure);
+            return (only_one, is_told.then_some(first));
         }
         let Several { coarse, proof } = several;
         let Some(whitened) = coarse.against(&observed, self.most_force) else {
-            return SeveralTouches::one(*one, sure);
+            return (only_one, None);
         };
         let several = self.more_than_one(&observed, (coarse, &whitened), &alone);
         let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
@@ -192,7 +213,7 @@ impl Matching {
             },
             k => self.touches(&observed, &several[k - 1].1.0, shares[k]),
         };
-        SeveralTouches { shares, ..answer }
+        (SeveralTouches { shares, ..answer }, Some(all))
     }
 
     /// Two points, three, and an area, each with the logarithm of its prior and its evidence.
@@ -258,12 +279,16 @@ impl Matching {
         let observed = Observation::new(reading, &self.errors, &self.used);
         let start = self.spots_of(last);
         let joint = self.joined(&observed, &start, Some(STEPS))?;
-        let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
-        let explained = 2.0 * joint.left <= last.unexplained + differs;
-        explained.then(|| SeveralTouches {
+        self.explains(&joint, last).then(|| SeveralTouches {
             shares: last.shares,
             ..self.touches(&observed, &[joint], last.probability)
         })
+    }
+
+    /// Whether what is left over may be noise beside what was left before.
+    fn explains(&self, joint: &Joint, last: &SeveralTouches) -> bool {
+        let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
+        2.0 * joint.left <= last.unexplained + differs
     }
 
     fn spots_of(&self, touches: &SeveralTouches) -> Vec<Spot> {

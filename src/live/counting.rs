@@ -1,7 +1,8 @@
 //! How many touches there are, over time: two looks that say the same are believed, and in between all touches are followed
 //! together.
 
-use crate::inference::{Contact, Matching, Several, SeveralTouches};
+use super::lately::Lately;
+use crate::inference::{Contact, Matching, Several, SeveralTouches, TouchesBefore, TouchesBeside};
 use crate::units;
 
 /// Seconds between looks: while what is shown is what was seen, and while it is not. Of several that were seen again and again
@@ -28,6 +29,9 @@ pub(super) struct Counting {
     pub several: Several,
     /// Touches that are more than one point; absent while there is one.
     shown: Option<SeveralTouches>,
+    /// What they are followed by, where it is known what touched before one of them came.
+    beside: Option<TouchesBeside>,
+    lately: Lately,
     /// Looks in a row that doubted it.
     doubted: u32,
     last_look: Option<u64>,
@@ -53,6 +57,8 @@ impl Counting {
         Self {
             several: Several::new(matching),
             shown: None,
+            beside: None,
+            lately: Lately::default(),
             doubted: 0,
             last_look: None,
             settled_s: SETTLED_S,
@@ -70,12 +76,18 @@ impl Counting {
 
     /// Nothing touches any more, or something else does.
     pub fn end(&mut self) {
-        (self.shown, self.last_look) = (None, None);
+        (self.shown, self.beside, self.last_look) = (None, None, None);
+        self.lately.forget();
         (self.doubted, self.usual, self.settled_s) = (0, 0.0, SETTLED_S);
     }
 
     /// The touches that go on, where they are more than one point, and whether they explain this sample (strain).
-    pub fn track(&mut self, matching: &Matching, strain: &[f64]) -> Option<(SeveralTouches, bool)> {
+    pub fn track(
+        &mut self,
+        matching: &Matching,
+        time_us: u64,
+        strain: &[f64],
+    ) -> Option<(SeveralTouches, bool)> {
         let shown = self.shown.as_ref()?;
         if shown.contacts.is_empty() {
             if squares(matching, strain) > GROWN * self.felt {
@@ -84,7 +96,10 @@ impl Counting {
             }
             return Some((shown.clone(), false));
         }
-        let tracked = matching.track_several(strain, shown);
+        let tracked = match &mut self.beside {
+            Some(beside) => matching.track_beside(strain, beside, shown),
+            None => matching.track_several(strain, shown),
+        };
         let explained = tracked.is_some();
         if let Some(tracked) = tracked {
             let unexplained = shown.unexplained;
@@ -94,7 +109,17 @@ impl Counting {
                 ..tracked
             });
         }
-        Some((self.shown.clone()?, explained))
+        let shown = self.shown.as_ref()?;
+        self.lately.see(matching, time_us, strain, shown);
+        Some((shown.clone(), explained))
+    }
+
+    /// One touch goes on.
+    pub fn see_one(&mut self, matching: &Matching, time_us: u64, strain: &[f64], one: &Contact) {
+        if self.shown.is_none() {
+            let one = self.one(*one);
+            self.lately.see(matching, time_us, strain, &one);
+        }
     }
 
     /// The touches that were seen last, where they are more than one point.
@@ -114,7 +139,8 @@ impl Counting {
 
     /// Whether it is time to look again at touches that leave so much unexplained.
     pub fn is_due(&self, time_us: u64, unexplained: f64) -> bool {
-        let wait = if self.is_settled(unexplained) {
+        let changes = self.lately.is_left_since(time_us, SETTLED_S);
+        let wait = if self.is_settled(unexplained) && !changes {
             self.settled_s
         } else {
             UNSETTLED_S
@@ -126,7 +152,7 @@ impl Counting {
     /// Looks how many there are, where `one` is what was found where only one is looked for.
     pub fn look(&mut self, matching: &mut Matching, time_us: u64, strain: &[f64], one: &Contact) {
         (self.last_look, self.felt) = (Some(time_us), squares(matching, strain));
-        let seen = matching.count(&self.several, strain, one);
+        let (seen, beside) = self.count(matching, strain, one);
         let channels = matching.used.iter().filter(|u| **u).count() as f64;
         self.usual = MORE * seen.unexplained + channels + BEYOND * (2.0 * channels).sqrt();
         let point = SeveralTouches::one(*one, 1.0);
@@ -149,11 +175,27 @@ impl Counting {
             self.doubted = 0;
             self.sure_of_one = seen.probability;
             self.shown = (!seen.alike(&point)).then_some(seen);
+            self.beside = beside;
         } else if let Some(shown) = &mut self.shown {
             shown.probability = share;
         } else {
             self.sure_of_one = share;
         }
+    }
+}
+
+impl Counting {
+    /// How many there are, by what touched before and by itself.
+    fn count(
+        &self,
+        matching: &mut Matching,
+        strain: &[f64],
+        one: &Contact,
+    ) -> (SeveralTouches, Option<TouchesBeside>) {
+        let lately = self.lately.before(matching);
+        let earlier = self.beside.as_ref().map(TouchesBeside::before);
+        let before: Vec<&TouchesBefore> = earlier.into_iter().chain(&lately).collect();
+        matching.count_after(&self.several, strain, one, &before)
     }
 }
 
@@ -177,7 +219,7 @@ mod tests {
     ) -> Vec<f64> {
         let mut at = Vec::new();
         for time_us in times.step_by(STEP_US as usize) {
-            let left = match counting.track(matching, reading) {
+            let left = match counting.track(matching, time_us, reading) {
                 Some((touches, true)) => touches.unexplained,
                 Some((_, false)) => f64::INFINITY,
                 None => matching.find(reading).unexplained,

@@ -407,7 +407,7 @@ impl Pipeline {
 
     /// The touches, and whether they explain the sample; nothing where the reading is rather of something that lets go.
     fn find(&mut self, time_us: u64, strain: &[f64]) -> (Option<SeveralTouches>, bool) {
-        let several = self.counting.track(&self.matching, strain);
+        let several = self.counting.track(&self.matching, time_us, strain);
         if let Some((touches, explained)) = several {
             let left = if explained {
                 touches.unexplained
@@ -427,6 +427,7 @@ impl Pipeline {
         let Some(one) = one else {
             return (None, false);
         };
+        (self.counting).see_one(&self.matching, time_us, strain, &one);
         let several = self.counting.shown().is_some();
         if several || self.counting.is_due(time_us, one.unexplained) {
             (self.counting).look(&mut self.matching, time_us, strain, &one);

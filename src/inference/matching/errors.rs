@@ -61,18 +61,11 @@ impl ReadingErrors {
         dragging.map_or(0.0, |n| n.making.along_either())
     }
 
-    /// The same, of one channel so many times what they are for this reading.
-    pub(in crate::inference) fn worse_at(
-        &self,
-        channel: usize,
-        times: f64,
-        reading: &[f64],
-        used: &[bool],
-    ) -> Self {
+    /// The same, of one channel so many times what they are where it has such a weight.
+    pub(in crate::inference) fn worse_at(&self, channel: usize, times: f64, weight: f64) -> Self {
         let mut worse = self.clone();
-        let variance = self.weights(reading, used)[channel].recip();
-        worse.noise[channel] =
-            worse.noise[channel].hypot(((times * times - 1.0) * variance).sqrt());
+        let more = (times * times - 1.0) / weight;
+        worse.noise[channel] = worse.noise[channel].hypot(more.sqrt());
         worse
     }
 

@@ -194,6 +194,8 @@ impl<'a> WeighedReading<'a> {
 pub(in crate::inference) struct Observation<'a> {
     /// A channel that reads no strain is left out, and stands here as zero.
     x: Cow<'a, [f64]>,
+    /// Absent where it is the reading.
+    sizes: Option<Vec<f64>>,
     /// One over the variance of every channel, without gluing.
     pub w: Vec<f64>,
     /// Weighted squares of a reading without a touch.
@@ -207,27 +209,48 @@ pub(in crate::inference) struct Observation<'a> {
 impl<'a> Observation<'a> {
     /// A reading with the weights that it has where gluing does not count.
     pub fn new(reading: &'a [f64], errors: &ReadingErrors, used: &[bool]) -> Self {
+        Self::sized(reading, None, errors, used)
+    }
+
+    /// The same where channels are off by shares of something else than the whole reading (strain).
+    pub fn sized(
+        reading: &'a [f64],
+        sizes: Option<Vec<f64>>,
+        errors: &ReadingErrors,
+        used: &[bool],
+    ) -> Self {
         if reading.iter().all(|&x| is_a_strain(x)) {
-            return Self::of(Cow::Borrowed(reading), errors, used);
+            return Self::of(Cow::Borrowed(reading), sizes, errors, used);
         }
         let trusted = |(x, used): (&f64, &bool)| *used && is_a_strain(*x);
         let used: Vec<bool> = reading.iter().zip(used).map(trusted).collect();
         let read = |&x: &f64| if is_a_strain(x) { x } else { 0.0 };
         let reading: Vec<f64> = reading.iter().map(read).collect();
-        Self::of(Cow::Owned(reading), errors, &used)
+        Self::of(Cow::Owned(reading), sizes, errors, &used)
     }
 
-    fn of(x: Cow<'a, [f64]>, errors: &ReadingErrors, used: &[bool]) -> Self {
-        let w = errors.weights(&x, used);
+    fn of(
+        x: Cow<'a, [f64]>,
+        sizes: Option<Vec<f64>>,
+        errors: &ReadingErrors,
+        used: &[bool],
+    ) -> Self {
+        let w = errors.weights(sizes.as_deref().unwrap_or(&x), used);
         let drift = errors.drift * errors.drift;
         let shared = SharedErrors::of(drift, &[], 0.0, &w);
         Self {
             squares: WeighedReading::new(&x, &w, &shared).squares,
             shared,
             x,
+            sizes,
             w,
             drift,
         }
+    }
+
+    /// What channels are off by shares of (strain).
+    pub fn sizes(&self) -> &[f64] {
+        self.sizes.as_deref().unwrap_or(&self.x)
     }
 
     /// Strain of every channel (a ratio), zero for channels that read none.

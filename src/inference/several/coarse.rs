@@ -82,10 +82,11 @@ impl Coarse {
             .collect();
         let n = trusted.len();
         let x: Vec<f64> = trusted.iter().map(|&c| observed.reading()[c]).collect();
-        let mean = x.iter().map(|x| x * x).sum::<f64>() / n as f64;
+        let sizes: Vec<f64> = trusted.iter().map(|&c| observed.sizes()[c]).collect();
+        let mean = sizes.iter().map(|x| x * x).sum::<f64>() / n as f64;
         let mut covariance = DMatrix::from_element(n, n, observed.drift);
         for (k, &c) in trusted.iter().enumerate() {
-            covariance[(k, k)] += observed.w[c].recip() + off_between(x[k], mean, self.making);
+            covariance[(k, k)] += observed.w[c].recip() + off_between(sizes[k], mean, self.making);
         }
         let whitening = covariance.cholesky()?.l().try_inverse()?;
         let mut whitened = Whitened {

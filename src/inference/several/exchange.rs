@@ -80,13 +80,15 @@ impl<'a> Exchange<'a> {
         most_force: f64,
     ) -> Self {
         let reading = observed.reading();
-        let trusted = || (reading.iter().zip(&observed.w)).filter(|(_, w)| **w > 0.0);
+        let trusted = || (observed.sizes().iter().zip(&observed.w)).filter(|(_, w)| **w > 0.0);
         let mean = trusted().map(|(x, _)| x * x).sum::<f64>() / trusted().count().max(1) as f64;
         let weight = |(x, w): (&f64, &f64)| {
             let variance = w.recip() + coarse::off_between(*x, mean, making);
             if *w > 0.0 { variance.recip() } else { 0.0 }
         };
-        let weights: Vec<f64> = reading.iter().zip(&observed.w).map(weight).collect();
+        let weights: Vec<f64> = (observed.sizes().iter().zip(&observed.w))
+            .map(weight)
+            .collect();
         Self {
             map,
             reading,
@@ -121,6 +123,32 @@ impl<'a> Exchange<'a> {
         let places: Vec<Place> = spots.iter().map(|spot| self.place(spot.at)).collect();
         let another = self.with_another(places)?;
         (another.gain > 0.0).then(|| another.spots())
+    }
+
+    /// Places and forces (N) of one more that explains most beside spots of which it is known what a newton reads (strain), the
+    /// best first, apart from each other.
+    pub fn beside(&self, known: &[(Spot, Vec<f64>)], count: usize) -> Vec<Spot> {
+        let place = |(spot, reading): &(Spot, Vec<f64>)| Place {
+            reading: reading.clone(),
+            ..self.place(spot.at)
+        };
+        let places: Vec<Place> = known.iter().map(place).collect();
+        let Some(mut held) = self.hold(&places) else {
+            return Vec::new();
+        };
+        let mut found = Vec::with_capacity(count);
+        while found.len() < count {
+            let (gain, node) = best_beside(&self.map.templates, &self.map.places, &held);
+            if gain <= 0.0 {
+                break;
+            }
+            held.positions.push(self.map.places[node]);
+            let at = self.map.mesh.vertex_point(node);
+            let all = [&places[..], &[self.place(at)]].concat();
+            let with_it = self.explained(all).places;
+            found.extend(with_it.last().map(|p| Spot::point(at, p.force)));
+        }
+        found
     }
 
     /// Where spots go from a start.

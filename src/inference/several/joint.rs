@@ -4,11 +4,15 @@
 //! under these forces, a common drift, and what each touch may have about it. Gauss–Newton with Levenberg's damping moves
 //! all places at once; the forces of given places have a closed form. What the reading's density is with all of them
 //! integrated out is P. S. Laplace's approximation around the likeliest.
+//!
+//! Of touches that were there before (`before`) it is known what they read, and where they were: a normal prior, which stands
+//! in the equations as two more rows for each.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::before::TouchesBefore;
 use super::spot::{Felt, RADII, Spot};
 use crate::inference::deviation::{Nuisance, TouchDoubts};
 use crate::inference::matching::Matching;
@@ -54,7 +58,9 @@ impl Joint {
 }
 
 /// What is held while spots near by are tried.
-struct HeldSpots {
+struct HeldSpots<'a> {
+    /// The first spots are touches that were there before.
+    before: Option<&'a TouchesBefore>,
     trusted: Vec<usize>,
     /// L of C = L Lᵀ.
     lower: DMatrix<f64>,
@@ -65,7 +71,12 @@ struct HeldSpots {
     reading: DVector<f64>,
 }
 
-impl HeldSpots {
+impl HeldSpots<'_> {
+    /// How many spots were there before.
+    fn known(&self) -> usize {
+        self.before.map_or(0, |before| before.spots.len())
+    }
+
     fn whiten(&self, values: &[f64]) -> DVector<f64> {
         let picked = self.trusted.iter().map(|&c| values[c]);
         let mut v = DVector::from_iterator(self.trusted.len(), picked);
@@ -90,9 +101,20 @@ impl Matching {
         start: &[Spot],
         steps: Option<usize>,
     ) -> Option<Joint> {
+        self.joined_with(observed, None, start, steps)
+    }
+
+    /// The same where the first spots are touches that were there before, if any were.
+    pub(super) fn joined_with(
+        &self,
+        observed: &Observation,
+        before: Option<&TouchesBefore>,
+        start: &[Spot],
+        steps: Option<usize>,
+    ) -> Option<Joint> {
         let mut spots = start.to_vec();
         let turns = if steps.is_some() { 1 } else { TURNS };
-        let mut held = self.held(observed, &spots)?;
+        let mut held = self.held(observed, before, &spots)?;
         for _ in 0..turns {
             let tried = self.descend_together(&held, spots, steps.unwrap_or(STEPS))?;
             spots = tried.spots;
@@ -100,13 +122,18 @@ impl Matching {
             for (spot, (about, _)) in spots.iter_mut().zip(about) {
                 spot.about = about;
             }
-            held = self.held(observed, &spots)?;
+            held = self.held(observed, before, &spots)?;
         }
         let tried = self.try_spots(&held, spots)?;
         self.distributed(&held, &tried)
     }
 
-    fn held(&self, observed: &Observation, spots: &[Spot]) -> Option<HeldSpots> {
+    fn held<'a>(
+        &self,
+        observed: &Observation,
+        before: Option<&'a TouchesBefore>,
+        spots: &[Spot],
+    ) -> Option<HeldSpots<'a>> {
         let trusted: Vec<usize> = (0..observed.w.len())
             .filter(|&c| observed.w[c] > 0.0)
             .collect();
@@ -117,11 +144,13 @@ impl Matching {
         }
         let mut x = observed.reading().to_vec();
         let mut nuisances = Vec::with_capacity(spots.len());
-        for spot in spots {
+        for (number, spot) in spots.iter().enumerate() {
+            let before = before.filter(|before| number < before.spots.len());
             if let Some(deviations) = &self.errors.deviations {
                 let own = deviations.own.at(spot.at);
+                let doubt = before.map_or(1.0, |before| before.doubt);
                 for (k, &c) in trusted.iter().enumerate() {
-                    covariance[(k, k)] += (spot.force * own[c]).powi(2);
+                    covariance[(k, k)] += (doubt * spot.force * own[c]).powi(2);
                 }
             }
             let of_spot = self.nuisances_of(spot);
@@ -133,7 +162,7 @@ impl Matching {
             nuisances.push(of_spot);
             if let Some(shared) = self
                 .nuisances()
-                .filter(|_| spot.about != TouchDoubts::default())
+                .filter(|_| before.is_none() && spot.about != TouchDoubts::default())
             {
                 for (x, known) in x.iter_mut().zip(shared.reading(&spot.about, spot.at)) {
                     *x += spot.force * known;
@@ -142,6 +171,7 @@ impl Matching {
         }
         let lower = covariance.cholesky()?.unpack();
         let mut held = HeldSpots {
+            before,
             log: (0..n).map(|k| lower[(k, k)].ln()).sum(),
             reading: DVector::zeros(n),
             trusted,
@@ -161,7 +191,12 @@ impl Matching {
                 return None;
             }
         }
-        let felt: Vec<Felt> = spots.iter().map(|spot| self.felt(spot)).collect();
+        let mut felt: Vec<Felt> = spots.iter().map(|spot| self.felt(spot)).collect();
+        if let Some(before) = held.before {
+            for felt in &mut felt[..before.spots.len()] {
+                before.correct(&mut felt.reading);
+            }
+        }
         let readings: Vec<_> = felt.iter().map(|f| held.whiten(&f.reading)).collect();
         let columns = DMatrix::from_columns(&readings);
         let solved = columns.tr_mul(&columns).cholesky()?;
@@ -173,8 +208,9 @@ impl Matching {
             spot.force = force.min(self.most_force);
         }
         let forces = DVector::from_iterator(spots.len(), spots.iter().map(|s| s.force));
+        let moved = (held.before).map_or(0.0, |before| before.moved(&self.map, &spots));
         Some(TriedSpots {
-            left: 0.5 * (&held.reading - columns * forces).norm_squared(),
+            left: 0.5 * (&held.reading - columns * forces).norm_squared() + 0.5 * moved,
             spots,
             felt,
             readings,
@@ -192,7 +228,7 @@ impl Matching {
         let most = 3.0 * self.map.spacing();
         let mut damping = 1e-4;
         for _ in 0..steps {
-            let (columns, left) = equations(held, &best);
+            let (columns, left) = self.equations(held, &best);
             let mut normal = columns.tr_mul(&columns);
             for k in 0..normal.nrows() {
                 normal[(k, k)] *= 1.0 + damping;
@@ -230,19 +266,61 @@ impl Matching {
         Some(best)
     }
 
+    /// Columns of all unknowns, whitened, and what is left over of the reading; below them what is known of places.
+    fn equations(&self, held: &HeldSpots, tried: &TriedSpots) -> (DMatrix<f64>, DVector<f64>) {
+        let mut columns = Vec::new();
+        let mut left = held.reading.clone();
+        for ((spot, felt), reading) in tried.spots.iter().zip(&tried.felt).zip(&tried.readings) {
+            let places = felt.columns.iter();
+            columns.extend(places.map(|change| held.whiten(change) * spot.force));
+            columns.push(reading.clone());
+            left.axpy(-spot.force, reading, 1.0);
+        }
+        let mut columns = DMatrix::from_columns(&columns);
+        if let Some(before) = held.before {
+            let rows = left.len();
+            let more = rows + 2 * before.spots.len();
+            (columns, left) = (
+                columns.resize_vertically(more, 0.0),
+                left.resize_vertically(more, 0.0),
+            );
+            for (k, (spot, felt)) in tried
+                .spots
+                .iter()
+                .zip(&tried.felt)
+                .take(before.spots.len())
+                .enumerate()
+            {
+                for (j, off) in before
+                    .off(&self.map, k, spot, felt.plane)
+                    .into_iter()
+                    .enumerate()
+                {
+                    columns[(rows + 2 * k + j, 3 * k + j)] = before.moves.recip();
+                    left[rows + 2 * k + j] = -off;
+                }
+            }
+        }
+        (columns, left)
+    }
+
     /// The normal distribution around the likeliest, and what lies under it.
     fn distributed(&self, held: &HeldSpots, tried: &TriedSpots) -> Option<Joint> {
-        let (columns, _) = equations(held, tried);
+        let (columns, _) = self.equations(held, tried);
         let mut precision = columns.tr_mul(&columns);
         let area: f64 = self.map.areas.iter().sum();
         let mut first = 0;
         // What is known before anything is measured: places anywhere on the part, no force above the largest. As normal
         // distributions that are as high as these are, so that no touch has more room than there is.
         let mut prior = 0.0;
-        for spot in &tried.spots {
-            precision[(first, first)] += TAU / area;
-            precision[(first + 1, first + 1)] += TAU / area;
-            prior -= area.ln() + self.most_force.ln();
+        for (k, spot) in tried.spots.iter().enumerate() {
+            if let Some(before) = held.before.filter(|before| k < before.spots.len()) {
+                prior -= (TAU * before.moves.powi(2)).ln() + self.most_force.ln();
+            } else {
+                precision[(first, first)] += TAU / area;
+                precision[(first + 1, first + 1)] += TAU / area;
+                prior -= area.ln() + self.most_force.ln();
+            }
             if spot.radius.is_some() {
                 let radii = (RADII[1] / RADII[0]).ln();
                 precision[(first + 2, first + 2)] += TAU / (radii * radii);
@@ -257,7 +335,9 @@ impl Matching {
         let log_root: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
         let covariance = factor.inverse();
         let known = about(held, &tried.spots, &tried.readings);
-        let orders: f64 = (1..=tried.spots.len()).map(|k| (k as f64).ln()).sum();
+        // Those that were there before are told apart.
+        let alike = tried.spots.len() - held.known();
+        let orders: f64 = (1..=alike).map(|k| (k as f64).ln()).sum();
         Some(Joint {
             log_evidence: -tried.left - held.log + prior + orders + 0.5 * unknowns * TAU.ln()
                 - log_root,
@@ -273,19 +353,6 @@ impl Matching {
     }
 }
 
-/// Columns of all unknowns, whitened, and what is left over of the reading.
-fn equations(held: &HeldSpots, tried: &TriedSpots) -> (DMatrix<f64>, DVector<f64>) {
-    let mut columns = Vec::new();
-    let mut left = held.reading.clone();
-    for ((spot, felt), reading) in tried.spots.iter().zip(&tried.felt).zip(&tried.readings) {
-        let places = felt.columns.iter();
-        columns.extend(places.map(|change| held.whiten(change) * spot.force));
-        columns.push(reading.clone());
-        left.axpy(-spot.force, reading, 1.0);
-    }
-    (DMatrix::from_columns(&columns), left)
-}
-
 /// What is in that which the spots leave over of how each was made, and the standard deviation of its force along the
 /// surface (N).
 fn about(held: &HeldSpots, spots: &[Spot], readings: &[DVector<f64>]) -> Vec<(TouchDoubts, f64)> {
@@ -293,7 +360,7 @@ fn about(held: &HeldSpots, spots: &[Spot], readings: &[DVector<f64>]) -> Vec<(To
     for (spot, reading) in spots.iter().zip(readings) {
         left.axpy(-spot.force, reading, 1.0);
     }
-    let of_spot = |(spot, nuisances): (&Spot, &Vec<Nuisance>)| {
+    let of_spot = |(number, (spot, nuisances)): (usize, (&Spot, &Vec<Nuisance>))| {
         // What was known already has been taken off reading and model alike: this is all of it.
         let (mut about, mut variance) = (TouchDoubts::default(), 0.0);
         for nuisance in nuisances {
@@ -304,7 +371,14 @@ fn about(held: &HeldSpots, spots: &[Spot], readings: &[DVector<f64>]) -> Vec<(To
             let of_share = (1.0 - felt.norm_squared()).max(0.0);
             variance += (nuisance.force.length() * spot.force).powi(2) * of_share / 2.0;
         }
+        // How those lean that were there before is known with what they read.
+        let about = if number < held.known() {
+            spot.about
+        } else {
+            about
+        };
         (about, variance.sqrt())
     };
-    spots.iter().zip(&held.nuisances).map(of_spot).collect()
+    let spots = spots.iter().zip(&held.nuisances);
+    spots.enumerate().map(of_spot).collect()
 }

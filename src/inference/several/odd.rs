@@ -63,9 +63,8 @@ impl Matching {
         found: &Contact,
     ) -> [f64; 2] {
         let used = self.used.clone();
-        let trusted: Vec<usize> = (0..used.len())
-            .filter(|&c| used[c] && reading[c].is_finite())
-            .collect();
+        let weights = Observation::new(reading, &self.errors, &used).w;
+        let trusted: Vec<usize> = (0..used.len()).filter(|&c| weights[c] > 0.0).collect();
         let (mut odd, mut worse) = (Vec::new(), Vec::new());
         for &c in &trusted {
             self.used[c] = false;
@@ -76,7 +75,7 @@ impl Matching {
             let (log, noise) = (others.log_evidence(), self.errors.noise[c]);
             odd.push(log + log_density(reading[c], AT_REST * noise));
             odd.push(log + log_of_anything(reading[c], noise) - proof.less[c]);
-            let errors = self.errors.worse_at(c, WORSE, reading, &used);
+            let errors = self.errors.worse_at(c, WORSE, weights[c]);
             let observed = Observation::new(reading, &errors, &used);
             let answers = self.joined_from(&observed, others.0.iter().map(|one| &one.spots));
             worse.push(answers.log_evidence() - proof.less[c]);
@@ -138,12 +137,17 @@ mod tests {
         let (mut matching, several) = on(gauged_plate());
         let reading = read_touches(&matching.map, &[(340, 20.0)]);
         let root = (reading.iter().map(|x| x * x).sum::<f64>() / 8.0).sqrt();
-        for (gauge, by) in (0..8).flat_map(|c| [0.1, 0.15].map(|by| (c, by))) {
+        let all = (0..8).flat_map(|c| [0.1, 0.15].map(|by| (c, by, false)));
+        // What another gauge reads is no strain.
+        for (gauge, by, broken) in all.chain([(2, 0.15, true)]) {
             let mut off = reading.clone();
             off[gauge] += by * root;
+            if broken {
+                off[(gauge + 4) % 8] = f64::NAN;
+            }
             let one = matching.find(&off);
             let seen = matching.count(&several, &off, &one);
-            let said = format!("{gauge} {by} {seen:?}");
+            let said = format!("{gauge} {by} {broken} {seen:?}");
             assert!(seen.count() == Some(1) && seen.probability > 0.7, "{said}");
         }
     }
