@@ -41,6 +41,8 @@ const AREA: f64 = 0.03;
 const ODD_GAUGE: f64 = 0.01;
 /// That the model is worse where one of the gauges is than it says.
 const WORSE_GAUGE: f64 = 0.1;
+/// That it is so of all of them.
+const WORSE_THERE: f64 = 0.03;
 const UNCLEAR: f64 = 0.01;
 const PULL: f64 = 0.01;
 /// Several touches leave no more than this share of what a pull leaves that they are taken for.
@@ -177,7 +179,7 @@ impl Matching {
         let sure = match alone.best() {
             Some(best) => surely_one(best),
             // Too light to tell any others.
-            None if channels < LEAST_CHANNELS || one.strength > one.unexplained => 1.0,
+            None if channels < LEAST_CHANNELS || is_explained(one, channels) => 1.0,
             // A single one would have to pull.
             None => 0.0,
         };
@@ -194,8 +196,10 @@ impl Matching {
         let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
         let rival = several.iter().fold(nothing, |most, s| most.max(s.0));
         let ones = if rival > first {
-            let [odd, worse] = self.with_one_gauge_off(proof, reading, one);
-            sum_of([first, ODD_GAUGE.ln() + odd, WORSE_GAUGE.ln() + worse].into_iter())
+            let off = self.with_one_gauge_off(proof, reading, one);
+            let priors = [ODD_GAUGE, WORSE_GAUGE, WORSE_THERE];
+            let logs = off.iter().zip(priors).map(|(log, prior)| log + prior.ln());
+            sum_of(logs.chain([first]))
         } else {
             first
         };
@@ -405,4 +409,12 @@ fn surely_one(best: &Joint) -> f64 {
     let log_room = best.log_evidence - best.log_likelihood();
     let others = (1.0 - ONE) / ONE * (best.left + log_room).exp();
     (1.0 + others).recip()
+}
+
+/// Whether what one touch leaves over may be noise, and is less than what it explains.
+fn is_explained(one: &Contact, channels: usize) -> bool {
+    /// Deviations of χ².
+    const BEYOND: f64 = 4.0;
+    let noise = channels as f64 + BEYOND * (2.0 * channels as f64).sqrt();
+    one.unexplained < one.strength.min(noise)
 }

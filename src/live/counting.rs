@@ -182,9 +182,7 @@ impl Counting {
             self.sure_of_one = share;
         }
     }
-}
 
-impl Counting {
     /// How many there are, by what touched before and by itself.
     fn count(
         &self,

@@ -106,7 +106,7 @@ impl Lately {
             .sum();
         let count = trusted().count() as f64;
         let is_off = off > variance * (count + OFF * (2.0 * count).sqrt());
-        (size, is_off || !(size > 0.0))
+        (size, is_off || size.is_nan() || size <= 0.0)
     }
 
     /// The touches, and what was read of them, where something else is read now.

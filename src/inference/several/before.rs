@@ -11,7 +11,7 @@ use glam::{DMat2, DVec3};
 
 use super::answers::{Answers, flat_of};
 use super::density::sum_of;
-use super::exchange::Exchange;
+use super::exchange::{Exchange, MOST};
 use super::joint::Joint;
 use super::spot::Spot;
 use super::{Several, SeveralTouches, TouchKind};
@@ -23,8 +23,6 @@ use crate::inference::region::{CredibleRegion, DEVIATIONS};
 #[cfg(test)]
 mod tests;
 
-/// Touches that another may come to: where more are held, none more is searched for.
-const MOST: usize = 2;
 /// What may become of touches: how far each moves (m, standard deviation), the share of its errors that what was read of it does
 /// not hold then, since it leans otherwise and what a model lacks is another elsewhere; whether one more comes, and how likely
 /// all that is.
@@ -124,16 +122,17 @@ impl TouchesBefore {
         }
     }
 
-    /// How far one of them is from where it was along two directions, in deviations.
-    pub(super) fn off(
+    /// How far each of them is from where it was along the two directions of its plane, in deviations.
+    pub(super) fn off<'a>(
         &self,
         map: &ResponseMap,
-        number: usize,
-        now: &Spot,
-        plane: [DVec3; 2],
-    ) -> [f64; 2] {
-        let moved = map.mesh.point(now.at) - map.mesh.point(self.spots[number].at);
-        plane.map(|way| moved.dot(way) / self.moves)
+        now: impl Iterator<Item = (&'a Spot, [DVec3; 2])>,
+    ) -> Vec<f64> {
+        let of_spot = |(was, (now, plane)): (&Spot, (&Spot, [DVec3; 2]))| {
+            let moved = map.mesh.point(now.at) - map.mesh.point(was.at);
+            plane.map(|way| moved.dot(way) / self.moves)
+        };
+        self.spots.iter().zip(now).flat_map(of_spot).collect()
     }
 
     /// Weighted squares of how far all of them are from where they were.
@@ -157,7 +156,8 @@ impl TouchesBefore {
 }
 
 impl Matching {
-    /// Touches of which so much is read (strain), as those that another may come to; nothing of what is no few points.
+    /// Touches of which so much is read (strain), as those that another may come to; nothing of what is not points, or too many for
+    /// one more to be searched for beside them.
     #[must_use]
     pub fn before(&self, touches: &SeveralTouches, reading: &[f64]) -> Option<TouchesBefore> {
         let contacts = &touches.contacts;
@@ -165,7 +165,7 @@ impl Matching {
         let points = touches.kind == TouchKind::Points;
         let spots = self.spots_of(touches);
         let force: f64 = spots.iter().map(|spot| spot.force).sum();
-        if !few || !points || force <= 0.0 {
+        if !few || !points || force <= 0.0 || !reading.iter().all(|x| x.is_finite()) {
             return None;
         }
         let model = self.reading_of_all(touches);

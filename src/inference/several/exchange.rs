@@ -28,7 +28,7 @@ const ROUNDS: usize = 3;
 /// Half of the weighted squares that it takes to go on.
 const GAINED: f64 = 0.01;
 /// Spots that one is exchanged beside, at most.
-const MOST: usize = 2;
+pub(super) const MOST: usize = 2;
 
 /// A reading, and what its channels are weighed by.
 pub(super) struct Exchange<'a> {

@@ -278,27 +278,16 @@ impl Matching {
         }
         let mut columns = DMatrix::from_columns(&columns);
         if let Some(before) = held.before {
+            let pairs = tried.spots.iter().zip(&tried.felt);
+            let planes = pairs.map(|(spot, felt)| (spot, felt.plane));
+            let off = before.off(&self.map, planes);
             let rows = left.len();
-            let more = rows + 2 * before.spots.len();
-            (columns, left) = (
-                columns.resize_vertically(more, 0.0),
-                left.resize_vertically(more, 0.0),
-            );
-            for (k, (spot, felt)) in tried
-                .spots
-                .iter()
-                .zip(&tried.felt)
-                .take(before.spots.len())
-                .enumerate()
-            {
-                for (j, off) in before
-                    .off(&self.map, k, spot, felt.plane)
-                    .into_iter()
-                    .enumerate()
-                {
-                    columns[(rows + 2 * k + j, 3 * k + j)] = before.moves.recip();
-                    left[rows + 2 * k + j] = -off;
-                }
+            columns = columns.resize_vertically(rows + off.len(), 0.0);
+            left = left.resize_vertically(rows + off.len(), 0.0);
+            for (k, off) in off.into_iter().enumerate() {
+                // Of each of them two places and a force are unknown.
+                columns[(rows + k, 3 * (k / 2) + k % 2)] = before.moves.recip();
+                left[rows + k] = -off;
             }
         }
         (columns, left)

@@ -2,7 +2,7 @@
 
 use super::density::{log_density, log_of_anything, sum_of};
 use crate::inference::matching::weighed::Observation;
-use crate::inference::matching::{Contact, Matching};
+use crate::inference::matching::{Contact, Matching, ReadingErrors};
 
 /// Deviation of what a dead gauge reads, over its noise.
 const AT_REST: f64 = 4.0;
@@ -11,8 +11,9 @@ const AT_REST: f64 = 4.0;
 const MOST: f64 = 4.6;
 const ONE_LOOK: f64 = 0.1;
 
-/// How much worse the model of a gauge may be than it says: it says a mean over all of them.
+/// How much worse the model of a gauge may be than it says, and that of a place: it says a mean over all of them.
 const WORSE: f64 = 4.0;
+const WORSE_THERE: f64 = 3.0;
 
 /// What touches before have proved of gauges.
 #[derive(Clone)]
@@ -54,14 +55,14 @@ impl GaugeProof {
 }
 
 impl Matching {
-    /// Logarithms of the density of one point where a gauge reads nothing, or anything; and where the model of one is worse than
-    /// it says.
+    /// Logarithms of the density of one point where a gauge reads nothing, or anything; where the model of one is worse than it
+    /// says; and where that of all of them is.
     pub(super) fn with_one_gauge_off(
         &mut self,
         proof: &GaugeProof,
         reading: &[f64],
         found: &Contact,
-    ) -> [f64; 2] {
+    ) -> [f64; 3] {
         let used = self.used.clone();
         let weights = Observation::new(reading, &self.errors, &used).w;
         let trusted: Vec<usize> = (0..used.len()).filter(|&c| weights[c] > 0.0).collect();
@@ -80,7 +81,19 @@ impl Matching {
             let answers = self.joined_from(&observed, others.0.iter().map(|one| &one.spots));
             worse.push(answers.log_evidence() - proof.less[c]);
         }
-        [odd, worse].map(|logs| sum_of(logs.iter().copied()) - (logs.len() as f64).ln())
+        let [odd, worse] =
+            [odd, worse].map(|logs| sum_of(logs.iter().copied()) - (logs.len() as f64).ln());
+        [odd, worse, self.where_all_are_worse(reading, found)]
+    }
+
+    fn where_all_are_worse(&mut self, reading: &[f64], found: &Contact) -> f64 {
+        let errors = ReadingErrors {
+            relative: WORSE_THERE * self.errors.relative,
+            ..self.errors.clone()
+        };
+        let used = self.used.clone();
+        let observed = Observation::new(reading, &errors, &used);
+        self.alone(&observed, found).log_evidence()
     }
 }
 
@@ -93,7 +106,7 @@ mod tests {
     use glam::DVec3;
 
     use crate::inference::plate::{gauged_plate, plate, read_touches};
-    use crate::inference::{ReadingErrors, ResponseMap, Several};
+    use crate::inference::{ResponseMap, Several};
 
     #[test]
     fn a_gauge_that_was_right_is_less_likely_odd_until_it_is_not() {
@@ -103,13 +116,13 @@ mod tests {
         let mut matching = Matching::new(map, errors, 60.0);
         let touch = matching.find(&reading);
         let mut proof = GaugeProof::none(CHANNELS);
-        let [unproved, _] = matching.with_one_gauge_off(&proof, &reading, &touch);
+        let [unproved, ..] = matching.with_one_gauge_off(&proof, &reading, &touch);
         for _ in 0..40 {
             proof.learn(&matching, &reading, &touch);
         }
         let said = format!("{:?}", proof.less);
         assert!(proof.less.iter().all(|less| *less > 0.9 * MOST), "{said}");
-        let [proved, _] = matching.with_one_gauge_off(&proof, &reading, &touch);
+        let [proved, ..] = matching.with_one_gauge_off(&proof, &reading, &touch);
         assert!(proved < unproved - 1.0, "{proved} {unproved}");
         // One begins to read half as much again.
         let mut lying = reading;
@@ -153,6 +166,20 @@ mod tests {
     }
 
     #[test]
+    fn one_touch_of_which_the_model_is_off_at_all_gauges_is_one() {
+        let (mut matching, several) = on(gauged_plate());
+        let reading = read_touches(&matching.map, &[(340, 20.0)]);
+        let root = (reading.iter().map(|x| x * x).sum::<f64>() / 8.0).sqrt();
+        for turn in 0..6 {
+            let by = |c: usize| 0.09 * root * (2.1 * c as f64 + f64::from(turn)).sin();
+            let off: Vec<f64> = (0..8).map(|c| reading[c] + by(c)).collect();
+            let one = matching.find(&off);
+            let seen = matching.count(&several, &off, &one);
+            assert_eq!(seen.count(), Some(1), "{turn} {seen:?}");
+        }
+    }
+
+    #[test]
     fn what_no_single_touch_explains_is_not_one() {
         // Gauges that feel everything the same way, and read it the other way.
         let map = plate(30, 2e-3, |place| {
@@ -165,6 +192,14 @@ mod tests {
         let (mut matching, several) = on(map);
         let one = matching.find(&reading);
         let seen = matching.count(&several, &reading, &one);
+        assert_eq!(seen.count(), None, "{seen:?}");
+        // Nor where one that is found explains more than it leaves, and leaves far more than noise.
+        let found = Contact {
+            strength: 2e3,
+            unexplained: 9e2,
+            ..one
+        };
+        let seen = matching.count(&several, &reading, &found);
         assert_eq!(seen.count(), None, "{seen:?}");
     }
 }
