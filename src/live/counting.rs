@@ -10,6 +10,8 @@ use crate::units;
 const SETTLED_S: f64 = 0.2;
 const LONG_SETTLED_S: f64 = 0.8;
 const UNSETTLED_S: f64 = 0.05;
+/// Seconds after which there is something to see of another that comes.
+const SOON_S: f64 = 0.02;
 /// What is shown is given up when it is less likely than this in so many looks in a row.
 const DOUBTED: f64 = 0.1;
 const LOOKS: u32 = 2;
@@ -139,7 +141,8 @@ impl Counting {
 
     /// Whether it is time to look again at touches that leave so much unexplained.
     pub fn is_due(&self, time_us: u64, unexplained: f64) -> bool {
-        let changes = self.lately.is_left_since(time_us, SETTLED_S);
+        let changing = SOON_S..SETTLED_S;
+        let changes = (self.lately.left_s(time_us)).is_some_and(|s| changing.contains(&s));
         let wait = if self.is_settled(unexplained) && !changes {
             self.settled_s
         } else {

@@ -71,10 +71,10 @@ impl Lately {
         self.touches = Some(touches.clone());
     }
 
-    /// Whether something else has begun to be read less than so many seconds ago.
-    pub fn is_left_since(&self, time_us: u64, seconds: f64) -> bool {
-        let since = |left: u64| units::seconds_between(left, time_us);
-        self.left_us.is_some_and(|left| since(left) < seconds)
+    /// Seconds for which something else has been read.
+    pub fn left_s(&self, time_us: u64) -> Option<f64> {
+        let left = self.left_us?;
+        Some(units::seconds_between(left, time_us))
     }
 
     fn begin(&mut self, time_us: u64, strain: &[f64], touches: &SeveralTouches) {
