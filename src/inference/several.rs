@@ -12,6 +12,7 @@ mod coarse;
 mod density;
 mod exchange;
 mod joint;
+mod known;
 mod leeway;
 mod odd;
 mod spot;

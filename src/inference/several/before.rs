@@ -13,9 +13,9 @@ use super::answers::{Answers, flat_of};
 use super::density::sum_of;
 use super::exchange::{Exchange, MOST};
 use super::joint::Joint;
+use super::known::KnownSpots;
 use super::spot::Spot;
 use super::{Several, SeveralTouches, TouchKind};
-use crate::inference::map::ResponseMap;
 use crate::inference::matching::weighed::Observation;
 use crate::inference::matching::{Contact, Matching};
 use crate::inference::region::{CredibleRegion, DEVIATIONS};
@@ -64,15 +64,9 @@ pub struct TouchesBefore {
     contacts: Vec<Contact>,
     /// Of there having been so many.
     probability: f64,
-    pub(super) spots: Vec<Spot>,
     /// What was read (strain).
     reading: Vec<f64>,
-    /// What their model lacks of a newton of them (strain).
-    lacks: Vec<f64>,
-    /// Standard deviation of how far each has moved (m).
-    pub(super) moves: f64,
-    /// Share of the errors that is not held by what was read.
-    pub(super) doubt: f64,
+    known: KnownSpots,
 }
 
 /// Touches that were there before and one more, as they are followed.
@@ -112,45 +106,14 @@ impl TouchesBefore {
 
     /// Newtons of all of them.
     fn force(&self) -> f64 {
-        self.spots.iter().map(|spot| spot.force).sum()
-    }
-
-    /// What a newton of one of them reads by the model (strain), with what that lacks.
-    pub(super) fn correct(&self, reading: &mut [f64]) {
-        for (r, lack) in reading.iter_mut().zip(&self.lacks) {
-            *r += lack;
-        }
-    }
-
-    /// How far each of them is from where it was along the two directions of its plane, in deviations.
-    pub(super) fn off<'a>(
-        &self,
-        map: &ResponseMap,
-        now: impl Iterator<Item = (&'a Spot, [DVec3; 2])>,
-    ) -> Vec<f64> {
-        let of_spot = |(was, (now, plane)): (&Spot, (&Spot, [DVec3; 2]))| {
-            let moved = map.mesh.point(now.at) - map.mesh.point(was.at);
-            plane.map(|way| moved.dot(way) / self.moves)
-        };
-        self.spots.iter().zip(now).flat_map(of_spot).collect()
-    }
-
-    /// Weighted squares of how far all of them are from where they were.
-    pub(super) fn moved(&self, map: &ResponseMap, now: &[Spot]) -> f64 {
-        let pairs = self.spots.iter().zip(now);
-        let far = |(was, is): (&Spot, &Spot)| {
-            map.mesh
-                .point(is.at)
-                .distance_squared(map.mesh.point(was.at))
-        };
-        pairs.map(far).sum::<f64>() / self.moves.powi(2)
+        self.known.spots.iter().map(|spot| spot.force).sum()
     }
 
     /// What channels are off by shares of (strain) where those before are so many times as hard as they were.
     fn sizes(&self, reading: &[f64], times: f64) -> Vec<f64> {
         let pairs = reading.iter().zip(&self.reading);
         pairs
-            .map(|(x, was)| (x - times * was).hypot(self.doubt * times * was))
+            .map(|(x, was)| (x - times * was).hypot(self.known.doubt * times * was))
             .collect()
     }
 }
@@ -173,11 +136,13 @@ impl Matching {
         Some(TouchesBefore {
             contacts: contacts.clone(),
             probability: touches.probability,
-            spots,
-            lacks: lacks.collect(),
             reading: reading.to_vec(),
-            moves: STAY.moves,
-            doubt: STAY.doubt,
+            known: KnownSpots {
+                spots,
+                lacks: lacks.collect(),
+                moves: STAY.moves,
+                doubt: STAY.doubt,
+            },
         })
     }
 
@@ -205,7 +170,7 @@ impl Matching {
             let together = sum_of(logs.into_iter().chain([unknown.ln() + anew]));
             anew = together;
             let share = (more.log - together).exp();
-            let with_it = before.spots.len();
+            let with_it = before.contacts.len();
             let mut shares = seen.shares.map(|s| (1.0 - share) * s);
             let is_seen = seen.which() == with_it && shares[with_it] > share;
             shares[with_it] += share;
@@ -244,7 +209,7 @@ impl Matching {
         let times = times_of(before, &beside.spots);
         let sizes = Some(before.sizes(reading, times));
         let observed = Observation::sized(reading, sizes, &self.errors, &self.used);
-        let joint = self.joined_with(&observed, Some(before), &beside.spots, Some(STEPS))?;
+        let joint = self.joined_with(&observed, Some(&before.known), &beside.spots, Some(STEPS))?;
         let explained = self.explains(&joint, last);
         explained.then(|| {
             let answers = std::slice::from_ref(&joint);
@@ -265,19 +230,17 @@ impl Matching {
         before: &TouchesBefore,
         course: Course,
     ) -> Followed {
-        let before = TouchesBefore {
-            moves: course.moves,
-            doubt: course.doubt,
-            ..before.clone()
-        };
+        let mut before = before.clone();
+        (before.known.moves, before.known.doubt) = (course.moves, course.doubt);
         let mut sizes = before.sizes(reading, 1.0);
         let mut answers = Answers(Vec::new());
         for _ in 0..TURNS {
             let of = Some(sizes.clone());
             let observed = Observation::sized(reading, of, &self.errors, &self.used);
-            let starts = self.starts_beside(several, &observed, &before, course.more);
-            let joined = (starts.iter())
-                .filter_map(|start| self.joined_with(&observed, Some(&before), start, None));
+            let starts = self.starts_beside(several, &observed, &before.known, course.more);
+            let known = Some(&before.known);
+            let joined =
+                (starts.iter()).filter_map(|start| self.joined_with(&observed, known, start, None));
             answers = Answers::of(&self.map, joined);
             let Some(best) = answers.best() else {
                 break;
@@ -296,22 +259,22 @@ impl Matching {
         &self,
         several: &Several,
         observed: &Observation,
-        before: &TouchesBefore,
+        known: &KnownSpots,
         more: bool,
     ) -> Vec<Vec<Spot>> {
         if !more {
-            return vec![before.spots.clone()];
+            return vec![known.spots.clone()];
         }
         let felt = |spot: &Spot| {
             let mut reading = self.felt(spot).reading;
-            before.correct(&mut reading);
+            known.correct(&mut reading);
             (*spot, reading)
         };
-        let known: Vec<(Spot, Vec<f64>)> = before.spots.iter().map(felt).collect();
+        let beside: Vec<(Spot, Vec<f64>)> = known.spots.iter().map(felt).collect();
         let making = several.coarse.making;
         let exchange = Exchange::new(&self.map, observed, making, self.most_force);
-        let found = exchange.beside(&known, STARTS);
-        let with = |one: &Spot| [&before.spots[..], &[*one]].concat();
+        let found = exchange.beside(&beside, STARTS);
+        let with = |one: &Spot| [&known.spots[..], &[*one]].concat();
         found.iter().map(with).collect()
     }
 
@@ -341,7 +304,11 @@ impl Matching {
 
 /// How many times as hard touches are as they were.
 fn times_of(before: &TouchesBefore, now: &[Spot]) -> f64 {
-    let now: f64 = now.iter().take(before.spots.len()).map(|s| s.force).sum();
+    let now: f64 = now
+        .iter()
+        .take(before.contacts.len())
+        .map(|s| s.force)
+        .sum();
     now / before.force()
 }
 

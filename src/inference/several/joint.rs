@@ -5,14 +5,14 @@
 //! all places at once; the forces of given places have a closed form. What the reading's density is with all of them
 //! integrated out is P. S. Laplace's approximation around the likeliest.
 //!
-//! Of touches that were there before (`before`) it is known what they read, and where they were: a normal prior, which stands
+//! Of touches that were there before (`known`) it is known what they read, and where they were: a normal prior, which stands
 //! in the equations as two more rows for each.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::before::TouchesBefore;
+use super::known::KnownSpots;
 use super::spot::{Felt, RADII, Spot};
 use crate::inference::deviation::{Nuisance, TouchDoubts};
 use crate::inference::matching::Matching;
@@ -60,7 +60,7 @@ impl Joint {
 /// What is held while spots near by are tried.
 struct HeldSpots<'a> {
     /// The first spots are touches that were there before.
-    before: Option<&'a TouchesBefore>,
+    known: Option<&'a KnownSpots>,
     trusted: Vec<usize>,
     /// L of C = L Lᵀ.
     lower: DMatrix<f64>,
@@ -73,8 +73,8 @@ struct HeldSpots<'a> {
 
 impl HeldSpots<'_> {
     /// How many spots were there before.
-    fn known(&self) -> usize {
-        self.before.map_or(0, |before| before.spots.len())
+    fn count_known(&self) -> usize {
+        self.known.map_or(0, |known| known.spots.len())
     }
 
     fn whiten(&self, values: &[f64]) -> DVector<f64> {
@@ -108,13 +108,13 @@ impl Matching {
     pub(super) fn joined_with(
         &self,
         observed: &Observation,
-        before: Option<&TouchesBefore>,
+        known: Option<&KnownSpots>,
         start: &[Spot],
         steps: Option<usize>,
     ) -> Option<Joint> {
         let mut spots = start.to_vec();
         let turns = if steps.is_some() { 1 } else { TURNS };
-        let mut held = self.held(observed, before, &spots)?;
+        let mut held = self.held(observed, known, &spots)?;
         for _ in 0..turns {
             let tried = self.descend_together(&held, spots, steps.unwrap_or(STEPS))?;
             spots = tried.spots;
@@ -122,7 +122,7 @@ impl Matching {
             for (spot, (about, _)) in spots.iter_mut().zip(about) {
                 spot.about = about;
             }
-            held = self.held(observed, before, &spots)?;
+            held = self.held(observed, known, &spots)?;
         }
         let tried = self.try_spots(&held, spots)?;
         self.distributed(&held, &tried)
@@ -131,7 +131,7 @@ impl Matching {
     fn held<'a>(
         &self,
         observed: &Observation,
-        before: Option<&'a TouchesBefore>,
+        known: Option<&'a KnownSpots>,
         spots: &[Spot],
     ) -> Option<HeldSpots<'a>> {
         let trusted: Vec<usize> = (0..observed.w.len())
@@ -145,10 +145,10 @@ impl Matching {
         let mut x = observed.reading().to_vec();
         let mut nuisances = Vec::with_capacity(spots.len());
         for (number, spot) in spots.iter().enumerate() {
-            let before = before.filter(|before| number < before.spots.len());
+            let known = known.filter(|known| number < known.spots.len());
             if let Some(deviations) = &self.errors.deviations {
                 let own = deviations.own.at(spot.at);
-                let doubt = before.map_or(1.0, |before| before.doubt);
+                let doubt = known.map_or(1.0, |known| known.doubt);
                 for (k, &c) in trusted.iter().enumerate() {
                     covariance[(k, k)] += (doubt * spot.force * own[c]).powi(2);
                 }
@@ -162,7 +162,7 @@ impl Matching {
             nuisances.push(of_spot);
             if let Some(shared) = self
                 .nuisances()
-                .filter(|_| before.is_none() && spot.about != TouchDoubts::default())
+                .filter(|_| known.is_none() && spot.about != TouchDoubts::default())
             {
                 for (x, known) in x.iter_mut().zip(shared.reading(&spot.about, spot.at)) {
                     *x += spot.force * known;
@@ -171,7 +171,7 @@ impl Matching {
         }
         let lower = covariance.cholesky()?.unpack();
         let mut held = HeldSpots {
-            before,
+            known,
             log: (0..n).map(|k| lower[(k, k)].ln()).sum(),
             reading: DVector::zeros(n),
             trusted,
@@ -192,9 +192,9 @@ impl Matching {
             }
         }
         let mut felt: Vec<Felt> = spots.iter().map(|spot| self.felt(spot)).collect();
-        if let Some(before) = held.before {
-            for felt in &mut felt[..before.spots.len()] {
-                before.correct(&mut felt.reading);
+        if let Some(known) = held.known {
+            for felt in &mut felt[..known.spots.len()] {
+                known.correct(&mut felt.reading);
             }
         }
         let readings: Vec<_> = felt.iter().map(|f| held.whiten(&f.reading)).collect();
@@ -208,7 +208,7 @@ impl Matching {
             spot.force = force.min(self.most_force);
         }
         let forces = DVector::from_iterator(spots.len(), spots.iter().map(|s| s.force));
-        let moved = (held.before).map_or(0.0, |before| before.moved(&self.map, &spots));
+        let moved = (held.known).map_or(0.0, |known| known.moved(&self.map, &spots));
         Some(TriedSpots {
             left: 0.5 * (&held.reading - columns * forces).norm_squared() + 0.5 * moved,
             spots,
@@ -277,16 +277,16 @@ impl Matching {
             left.axpy(-spot.force, reading, 1.0);
         }
         let mut columns = DMatrix::from_columns(&columns);
-        if let Some(before) = held.before {
+        if let Some(known) = held.known {
             let pairs = tried.spots.iter().zip(&tried.felt);
             let planes = pairs.map(|(spot, felt)| (spot, felt.plane));
-            let off = before.off(&self.map, planes);
+            let off = known.off(&self.map, planes);
             let rows = left.len();
             columns = columns.resize_vertically(rows + off.len(), 0.0);
             left = left.resize_vertically(rows + off.len(), 0.0);
             for (k, off) in off.into_iter().enumerate() {
                 // Of each of them two places and a force are unknown.
-                columns[(rows + k, 3 * (k / 2) + k % 2)] = before.moves.recip();
+                columns[(rows + k, 3 * (k / 2) + k % 2)] = known.moves.recip();
                 left[rows + k] = -off;
             }
         }
@@ -303,8 +303,8 @@ impl Matching {
         // distributions that are as high as these are, so that no touch has more room than there is.
         let mut prior = 0.0;
         for (k, spot) in tried.spots.iter().enumerate() {
-            if let Some(before) = held.before.filter(|before| k < before.spots.len()) {
-                prior -= (TAU * before.moves.powi(2)).ln() + self.most_force.ln();
+            if let Some(known) = held.known.filter(|known| k < known.spots.len()) {
+                prior -= (TAU * known.moves.powi(2)).ln() + self.most_force.ln();
             } else {
                 precision[(first, first)] += TAU / area;
                 precision[(first + 1, first + 1)] += TAU / area;
@@ -325,7 +325,7 @@ impl Matching {
         let covariance = factor.inverse();
         let known = about(held, &tried.spots, &tried.readings);
         // Those that were there before are told apart.
-        let alike = tried.spots.len() - held.known();
+        let alike = tried.spots.len() - held.count_known();
         let orders: f64 = (1..=alike).map(|k| (k as f64).ln()).sum();
         Some(Joint {
             log_evidence: -tried.left - held.log + prior + orders + 0.5 * unknowns * TAU.ln()
@@ -361,7 +361,7 @@ fn about(held: &HeldSpots, spots: &[Spot], readings: &[DVector<f64>]) -> Vec<(To
             variance += (nuisance.force.length() * spot.force).powi(2) * of_share / 2.0;
         }
         // How those lean that were there before is known with what they read.
-        let about = if number < held.known() {
+        let about = if number < held.count_known() {
             spot.about
         } else {
             about
