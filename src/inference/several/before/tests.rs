@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::inference::ReadingErrors;
 use crate::inference::plate::{CHANNELS, gauged_plate, read_touches};
+use crate::inference::{ReadingErrors, ResponseMap};
 
 const FIRST: (usize, f64) = (370, 12.0);
 const SECOND: (usize, f64) = (612, 9.0);
