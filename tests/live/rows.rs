@@ -305,7 +305,7 @@ fn a_solid_does_so_too_and_two_fingers_on_it_are_two() {
     }
     let share = f64::from(two) / f64::from(all);
     println!("barrel: {share:.3} of {all} are two");
-    hold(share > 0.85, "two in 85 %");
+    hold(share > 0.97, "two in 97 %");
 }
 
 #[test]
