@@ -1,4 +1,4 @@
-//! Means, medians and quantiles of a handful of numbers: one definition each.
+//! Means, medians and quantiles of a handful of numbers, and how large noise may be: one definition each.
 
 /// The mean; NaN of none.
 #[must_use]
@@ -36,9 +36,21 @@ pub(crate) fn midpoint_median(mut values: Vec<f64>) -> f64 {
     f64::midpoint(values[last / 2], values[values.len() / 2])
 }
 
+/// What χ² with so many degrees of freedom is at most, to so many standard deviations beyond its mean.
+#[must_use]
+pub(crate) fn chi_squared(free: f64, deviations: f64) -> f64 {
+    free + deviations * (2.0 * free).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn chi_squared_of_two_has_a_deviation_of_two() {
+        assert_eq!(chi_squared(2.0, 0.0), 2.0);
+        assert_eq!(chi_squared(2.0, 3.0), 8.0);
+    }
 
     #[test]
     fn of_an_even_number_the_larger_in_the_middle_is_taken() {

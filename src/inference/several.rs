@@ -31,6 +31,7 @@ use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
 use crate::inference::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
+use crate::statistics::chi_squared;
 
 pub use self::before::{TouchesBefore, TouchesBeside};
 
@@ -116,15 +117,18 @@ impl SeveralTouches {
         kind(self.kind) == kind(other.kind) && self.count() == other.count()
     }
 
-    /// One touch at a point, as sure as that.
+    /// One touch at a point, as sure as that; anything else is as likely, one over the other, as it is before anything is read.
     #[must_use]
     pub fn one(contact: Contact, probability: f64) -> Self {
+        let others = [TWO, THREE, AREA, UNCLEAR];
+        let all: f64 = others.iter().sum();
+        let [two, three, area, unclear] = others.map(|p| (1.0 - probability) * p / all);
         Self {
             kind: TouchKind::Points,
             probability,
             contacts: vec![contact],
             unexplained: contact.unexplained,
-            shares: [probability, 1.0 - probability, 0.0, 0.0, 0.0],
+            shares: [probability, two, three, area, unclear],
         }
     }
 }
@@ -179,8 +183,8 @@ impl Matching {
         let first = ONE.ln() + alone.log_evidence();
         let sure = match alone.best() {
             Some(best) => surely_one(best),
-            // Too light to tell any others.
-            None if channels < LEAST_CHANNELS || is_explained(one, channels) => 1.0,
+            // Too light to tell any others: as likely as it is before anything is read.
+            None if channels < LEAST_CHANNELS || is_explained(one, channels) => ONE,
             // A single one would have to pull.
             None => 0.0,
         };
@@ -197,10 +201,14 @@ impl Matching {
         let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
         let rival = several.iter().fold(nothing, |most, s| most.max(s.0));
         let ones = if rival > first {
-            let off = self.with_one_gauge_off(proof, reading, one);
-            let priors = [ODD_GAUGE, WORSE_GAUGE, WORSE_THERE];
-            let logs = off.iter().zip(priors).map(|(log, prior)| log + prior.ln());
-            sum_of(logs.chain([first]))
+            let [odd, worse] = self.with_one_gauge_off(proof, reading, one);
+            let there = self.with_all_gauges_worse(reading, one);
+            let off = [(odd, ODD_GAUGE), (worse, WORSE_GAUGE), (there, WORSE_THERE)];
+            sum_of(
+                off.into_iter()
+                    .map(|(log, prior)| log + prior.ln())
+                    .chain([first]),
+            )
         } else {
             first
         };
@@ -416,6 +424,6 @@ fn surely_one(best: &Joint) -> f64 {
 fn is_explained(one: &Contact, channels: usize) -> bool {
     /// Deviations of χ².
     const BEYOND: f64 = 4.0;
-    let noise = channels as f64 + BEYOND * (2.0 * channels as f64).sqrt();
+    let noise = chi_squared(channels as f64, BEYOND);
     one.unexplained < one.strength.min(noise)
 }

@@ -3,6 +3,7 @@
 
 use super::lately::Lately;
 use crate::inference::{Contact, Matching, Several, SeveralTouches, TouchesBefore, TouchesBeside};
+use crate::statistics::chi_squared;
 use crate::units;
 
 /// Seconds between looks: while what is shown is what was seen, and while it is not. Of several that were seen again and again
@@ -157,10 +158,11 @@ impl Counting {
         (self.last_look, self.felt) = (Some(time_us), squares(matching, strain));
         let (seen, beside) = self.count(matching, strain, one);
         let channels = matching.used.iter().filter(|u| **u).count() as f64;
-        self.usual = MORE * seen.unexplained + channels + BEYOND * (2.0 * channels).sqrt();
+        let noise = chi_squared(channels, BEYOND);
+        self.usual = MORE * seen.unexplained + noise;
         let point = SeveralTouches::one(*one, 1.0);
         // Not where it is one because a gauge is odd.
-        let explained = one.unexplained < channels + BEYOND * (2.0 * channels).sqrt();
+        let explained = one.unexplained < noise;
         let surely_one = seen.alike(&point) && seen.probability > PROVED;
         if surely_one && explained && self.shown.is_none() {
             self.several.learn(matching, strain, one);

@@ -18,7 +18,7 @@ use std::collections::VecDeque;
 use nalgebra::DMatrix;
 
 use super::feeling::BEGINS;
-use crate::inference::{SeveralTouches, TouchKind};
+use crate::inference::SeveralTouches;
 
 use self::creep::Creep;
 use self::misfit::{EstimatedTouch, Misfit};
@@ -252,22 +252,12 @@ impl Drift {
             let noise = noise.iter().zip(doubt);
             noise.map(|(n, d)| n * n / samples + d).collect()
         };
-        let corrected = match &touches.contacts[..] {
-            [touch] if touch.narrow => {
-                let touch = EstimatedTouch {
-                    place: touch.position,
-                    force: touch.force,
-                    is_area: matches!(touches.kind, TouchKind::Area(_)),
-                    left: &mean,
-                    read: &read,
-                };
-                self.correct_under(touch, measured, used, ways)
-            }
-            _ => {
-                let variance = measured(&misfit::doubt_of(reading));
-                let off = (&mean[..], SUDDEN);
-                self.walk.correct(off, &variance, used, &ways()).is_some()
-            }
+        let corrected = if let Some(touch) = EstimatedTouch::of(touches, [&mean, &read]) {
+            self.correct_under(touch, measured, used, ways)
+        } else {
+            let variance = measured(&misfit::doubt_of(reading));
+            let off = (&mean[..], SUDDEN);
+            self.walk.correct(off, &variance, used, &ways()).is_some()
         };
         if !corrected {
             self.misfit.forget();

@@ -1,5 +1,7 @@
 //! Whether anything touches: weighted squares against χ² of the channels, with a few samples of patience.
 
+use crate::statistics::chi_squared;
+
 /// Samples in a row that make or end a touch.
 pub(super) const BEGINS: u32 = 3;
 const ENDS: u32 = 6;
@@ -52,9 +54,8 @@ impl Feeling {
         let gone = !self.touching || self.strange_s >= STRANGE_S || plain < GONE * self.usual;
         let squares = if gone { cautious } else { plain };
         self.usual += (plain - self.usual) * if self.touching { USUAL } else { 1.0 };
-        let scatter = (2.0 * channels).sqrt();
-        let begins = channels >= FEWEST && squares > channels + BEGIN * scatter;
-        let ends = channels < FEWEST || squares < channels + END * scatter;
+        let begins = channels >= FEWEST && squares > chi_squared(channels, BEGIN);
+        let ends = channels < FEWEST || squares < chi_squared(channels, END);
         self.above = if begins { self.above + 1 } else { 0 };
         self.below = if ends { self.below + 1 } else { 0 };
         if !self.touching && self.above >= BEGINS {

@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 
-use crate::statistics::mean;
+use crate::statistics::{chi_squared, mean};
 
 /// Mains, and how many of its harmonics are looked for (Hz).
 const MAINS: [f64; 2] = [50.0, 60.0];
@@ -188,7 +188,7 @@ fn lines(rows: &HumSamples) -> (Vec<HumLine>, HumSamples) {
         };
         // As χ² of two a channel.
         let free = 2.0 * channels as f64;
-        if strength < free + CLEAR * (2.0 * free).sqrt() {
+        if strength < chi_squared(free, CLEAR) {
             break;
         }
         let line = HumLine::fitted(&left, &middle, hertz);

@@ -3,6 +3,7 @@
 
 use super::pull;
 use crate::inference::Matching;
+use crate::statistics::chi_squared;
 
 /// Seconds for which a reading has to stay where it is before it is a level.
 const LEVEL_S: f64 = 0.3;
@@ -74,8 +75,7 @@ fn is_off(matching: &Matching, strain: &[f64], from: &[f64]) -> bool {
     let squares: Vec<f64> = trusted
         .map(|(((x, y), noise), _)| ((x - y) / noise).powi(2))
         .collect();
-    let count = squares.len() as f64;
-    squares.iter().sum::<f64>() > count + OFF * (2.0 * count).sqrt()
+    squares.iter().sum::<f64>() > chi_squared(squares.len() as f64, OFF)
 }
 
 /// Whether something that lets go would read about as well.

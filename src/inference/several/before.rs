@@ -9,7 +9,7 @@
 
 use glam::{DMat2, DVec3};
 
-use super::answers::{Answers, flat_of};
+use super::answers::Answers;
 use super::density::sum_of;
 use super::exchange::{Exchange, MOST};
 use super::joint::Joint;
@@ -292,8 +292,9 @@ impl Matching {
             let place = self.map.mesh.point(best.spots[k].at);
             let now = (found.contacts.iter_mut()).find(|c| c.position == place);
             if let Some(now) = now {
-                let flat = flat_of(best, k) + flat_in(&was.region, best.planes[k]);
-                now.region = CredibleRegion::of_normal(flat, best.planes[k]);
+                let plane = best.planes[k];
+                let flat = flat_in(&now.region, plane) + flat_in(&was.region, plane);
+                now.region = CredibleRegion::of_normal(flat, plane);
                 let share = now.force / was.force;
                 now.force_deviation = now.force_deviation.hypot(share * was.force_deviation);
             }

@@ -55,14 +55,14 @@ impl GaugeProof {
 }
 
 impl Matching {
-    /// Logarithms of the density of one point where a gauge reads nothing, or anything; where the model of one is worse than it
-    /// says; and where that of all of them is.
+    /// Logarithms of the density of one point where a gauge reads nothing, or anything, and where the model of one is worse than
+    /// it says.
     pub(super) fn with_one_gauge_off(
         &mut self,
         proof: &GaugeProof,
         reading: &[f64],
         found: &Contact,
-    ) -> [f64; 3] {
+    ) -> [f64; 2] {
         let used = self.used.clone();
         let weights = Observation::new(reading, &self.errors, &used).w;
         let trusted: Vec<usize> = (0..used.len()).filter(|&c| weights[c] > 0.0).collect();
@@ -81,12 +81,11 @@ impl Matching {
             let answers = self.joined_from(&observed, others.0.iter().map(|one| &one.spots));
             worse.push(answers.log_evidence() - proof.less[c]);
         }
-        let [odd, worse] =
-            [odd, worse].map(|logs| sum_of(logs.iter().copied()) - (logs.len() as f64).ln());
-        [odd, worse, self.where_all_are_worse(reading, found)]
+        [odd, worse].map(|logs| sum_of(logs.iter().copied()) - (logs.len() as f64).ln())
     }
 
-    fn where_all_are_worse(&mut self, reading: &[f64], found: &Contact) -> f64 {
+    /// Logarithm of the density of one point where the model of all gauges is worse than it says.
+    pub(super) fn with_all_gauges_worse(&mut self, reading: &[f64], found: &Contact) -> f64 {
         let errors = ReadingErrors {
             relative: WORSE_THERE * self.errors.relative,
             ..self.errors.clone()
@@ -102,9 +101,9 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::inference::matching::tests::{CHANNELS, maps};
     use glam::DVec3;
 
+    use crate::inference::matching::tests::{CHANNELS, maps};
     use crate::inference::plate::{gauged_plate, plate, read_touches};
     use crate::inference::{ResponseMap, Several};
 
@@ -116,13 +115,13 @@ mod tests {
         let mut matching = Matching::new(map, errors, 60.0);
         let touch = matching.find(&reading);
         let mut proof = GaugeProof::none(CHANNELS);
-        let [unproved, ..] = matching.with_one_gauge_off(&proof, &reading, &touch);
+        let [unproved, _] = matching.with_one_gauge_off(&proof, &reading, &touch);
         for _ in 0..40 {
             proof.learn(&matching, &reading, &touch);
         }
         let said = format!("{:?}", proof.less);
         assert!(proof.less.iter().all(|less| *less > 0.9 * MOST), "{said}");
-        let [proved, ..] = matching.with_one_gauge_off(&proof, &reading, &touch);
+        let [proved, _] = matching.with_one_gauge_off(&proof, &reading, &touch);
         assert!(proved < unproved - 1.0, "{proved} {unproved}");
         // One begins to read half as much again.
         let mut lying = reading;
@@ -135,6 +134,7 @@ mod tests {
         proof.forget();
         assert_eq!(proof.less, [0.0; CHANNELS]);
     }
+
     fn on(map: ResponseMap) -> (Matching, Several) {
         let errors = ReadingErrors {
             relative: 0.02,

@@ -3,6 +3,8 @@
 
 use glam::DVec3;
 
+use crate::inference::{SeveralTouches, TouchKind};
+
 /// Metres within which a touch is where it was, and how much harder it may become before it is looked at again.
 const STAYS: f64 = 6e-3;
 const HARDER: f64 = 1.25;
@@ -53,6 +55,22 @@ pub(super) struct EstimatedTouch<'a> {
     pub is_area: bool,
     pub left: &'a [f64],
     pub read: &'a [f64],
+}
+
+impl<'a> EstimatedTouch<'a> {
+    /// Of touches that leave so much of what is read (strain); nothing where they are several, or where one is is not known.
+    pub fn of(touches: &SeveralTouches, [left, read]: [&'a [f64]; 2]) -> Option<Self> {
+        let [touch] = &touches.contacts[..] else {
+            return None;
+        };
+        touch.narrow.then_some(Self {
+            place: touch.position,
+            force: touch.force,
+            is_area: matches!(touches.kind, TouchKind::Area(_)),
+            left,
+            read,
+        })
+    }
 }
 
 impl Misfit {

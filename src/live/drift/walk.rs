@@ -23,7 +23,7 @@ mod tests;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::steps::Steps;
-use crate::statistics::{mean, median};
+use crate::statistics::{chi_squared, mean, median};
 
 /// What a channel walks by in a second at least, and what all do together beside their speed (strain): a workshop is never
 /// quite still.
@@ -274,7 +274,7 @@ impl RestWalk {
             return None;
         };
         let count = expected.trusted.len() as f64;
-        if expected.squares(off) > count + most * (2.0 * count).sqrt() {
+        if expected.squares(off) > chi_squared(count, most) {
             return None;
         }
         let off = among(off, &expected.trusted);

@@ -161,3 +161,29 @@ fn what_is_no_few_points_is_nothing_that_another_comes_to() {
     };
     assert!([area, three].iter().all(|t| before(t).is_none()));
 }
+
+#[test]
+fn where_the_first_may_be_elsewhere_too_its_region_holds_that() {
+    let mut bench = Bench::pressed();
+    let reading = read(&bench.matching.map, &[FIRST, SECOND], FIRST.1);
+    let (_, beside) = bench.seen(&reading);
+    let spots = beside.unwrap().spots;
+    let matching = &bench.matching;
+    let sizes = Some(bench.before.sizes(&reading, 1.0));
+    let observed = Observation::sized(&reading, sizes, &matching.errors, &matching.used);
+    let known = Some(&bench.before.known);
+    let best = matching
+        .joined_with(&observed, known, &spots, None)
+        .unwrap();
+    let mut other = best.clone();
+    let place = matching.map.mesh.point(best.spots[0].at);
+    let away = place + 12e-3 * DVec3::X;
+    other.spots[0].at = matching.map.mesh.index().nearest(away).0;
+    let region = |answers: &[Joint]| {
+        let found = matching.touches_beside(&observed, &bench.before, answers, 0.0);
+        let first = found.contacts.iter().find(|c| c.position == place);
+        first.unwrap().region
+    };
+    assert!(!region(std::slice::from_ref(&best)).holds(place, away));
+    assert!(region(&[best, other]).holds(place, away));
+}
