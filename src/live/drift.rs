@@ -11,6 +11,8 @@
 mod creep;
 mod misfit;
 mod steps;
+#[cfg(test)]
+mod tests;
 mod walk;
 
 use std::collections::VecDeque;
@@ -37,6 +39,8 @@ const BEFORE_S: f64 = 0.05;
 /// Standard deviations, and strain, by which rest may be off from what follows it: beyond them a touch goes or comes.
 const STEADY: f64 = 5.0;
 const STEADY_BY: f64 = 1.5e-6;
+/// Standard deviations by which noise alone makes it differ.
+const USUAL: f64 = 2.0;
 
 /// By how much a channel may bend because it creeps (strain), where it is asked how far it walks.
 const CREEPS: f64 = 0.1e-6;
@@ -172,19 +176,20 @@ impl Drift {
         let until = self.now_s - ago_s;
         let old = |block: &RestBlock| block.ends_s <= until;
         while self.waiting.front().is_some_and(old) && self.following() >= FOLLOWED_BY {
-            let steady = self.is_steady(noise, used);
+            let strays = self.strays(noise, used);
             let Some(block) = self.waiting.pop_front() else {
                 return;
             };
-            if !steady {
+            let Some(strays) = strays else {
                 self.walk.steps.interrupted();
                 continue;
-            }
+            };
             self.believed = true;
             self.go_on_to(block.ends_s, None);
             let off = block.mean.iter().zip(self.walk.rest(0.0));
             let off: Vec<f64> = off.map(|(x, b)| x - b).collect();
-            let variance: Vec<f64> = noise.iter().map(|n| n * n / block.samples).collect();
+            let of_mean = noise.iter().map(|n| n * n / block.samples);
+            let variance: Vec<f64> = of_mean.zip(strays).map(|(n, s)| n + s).collect();
             let off = (&off[..], f64::INFINITY);
             let bends = self.creep.bends_by(steps::STRETCH_S);
             if bends < CREEPS {
@@ -203,21 +208,25 @@ impl Drift {
         self.waiting.iter().skip(1).map(|b| b.samples).sum()
     }
 
-    /// Whether the oldest block that waits is what those after it are, in the mean.
-    fn is_steady(&self, noise: &[f64], used: &[bool]) -> bool {
+    /// By how much more than noise the oldest block that waits is off from those after it (strain², a channel): the end of a
+    /// touch that goes slowly is hardly a rest. Nothing where it is none at all.
+    fn strays(&self, noise: &[f64], used: &[bool]) -> Option<Vec<f64>> {
         let mut blocks = self.waiting.iter();
-        let Some(first) = blocks.next() else {
-            return false;
-        };
+        let first = blocks.next()?;
         let count: f64 = blocks.clone().map(|b| b.samples).sum();
-        if count == 0.0 {
-            return true;
-        }
-        (0..first.mean.len()).filter(|&c| used[c]).all(|c| {
+        let of_channel = |c: usize| {
             let sum: f64 = blocks.clone().map(|b| b.samples * b.mean[c]).sum();
             let deviation = noise[c] * (first.samples.recip() + count.recip()).sqrt();
-            (first.mean[c] - sum / count).abs() < STEADY * deviation + STEADY_BY
-        })
+            let off = (first.mean[c] - sum / count).abs();
+            let usual = USUAL * deviation;
+            let is_steady = off < STEADY * deviation + STEADY_BY;
+            is_steady.then(|| (off * off - usual * usual).max(0.0))
+        };
+        let channels = 0..first.mean.len();
+        let stays = |c: usize| !used[c] || count == 0.0;
+        channels
+            .map(|c| if stays(c) { Some(0.0) } else { of_channel(c) })
+            .collect()
     }
 
     /// A sample (strain since the tare) under a touch, and what that reads of it, with the ways in which it may be another touch
