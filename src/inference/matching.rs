@@ -21,6 +21,7 @@ mod find;
 mod kernels;
 mod leeway;
 pub(super) mod modes;
+mod rarity;
 mod sums;
 mod templates;
 pub(super) mod weighed;
