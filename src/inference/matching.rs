@@ -21,7 +21,6 @@ mod find;
 mod kernels;
 mod leeway;
 pub(super) mod modes;
-mod rarity;
 mod sums;
 mod templates;
 pub(super) mod weighed;

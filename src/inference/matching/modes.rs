@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use glam::{DMat2, DVec3};
 use nalgebra::Matrix3;
 
-use super::rarity::{rarity, rarity_slope};
 use super::weighed::{Observation, WeighedReading, WeighedTouch};
 use super::{Contact, Load, Matching};
 use crate::inference::deviation::{Nuisance, Nuisances, TouchDoubts};
@@ -185,8 +184,7 @@ impl Matching {
         let (mut force, mut cost) = measured.fit(&slope.reading, self.most_force);
         let mut damping = 1e-4;
         for _ in 0..STEPS {
-            let (normal, mut gradient) = measured.equations(&slope, force);
-            gradient[2] -= rarity_slope(force);
+            let (normal, gradient) = measured.equations(&slope, force);
             let mut damped = normal;
             for k in 0..3 {
                 damped[(k, k)] *= 1.0 + damping;
@@ -204,8 +202,8 @@ impl Matching {
             let there = map.mesh.index().nearest(map.mesh.point(at) + moved).0;
             let next = self.slope(&terms.about, there);
             let (next_force, next_cost) = measured.fit(&next.reading, self.most_force);
-            let gained = cost + rarity(force) - next_cost - rarity(next_force);
-            if gained > 0.0 {
+            if next_cost < cost {
+                let gained = cost - next_cost;
                 (at, slope, force, cost) = (there, next, next_force, next_cost);
                 damping *= 0.1;
                 if gained < 1e-4 {
@@ -259,8 +257,7 @@ impl Matching {
             ]),
             plane: slope.plane,
             cost,
-            log_evidence: -cost - rarity(force)
-                + 0.5 * covariance.determinant().max(f64::MIN_POSITIVE).ln(),
+            log_evidence: -cost + 0.5 * covariance.determinant().max(f64::MIN_POSITIVE).ln(),
         }
     }
 

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::kernels::{score_templates, score_with_gluing};
 use super::modes::{Mode, TURNS};
-use super::rarity::rarity;
 use super::weighed::Observation;
 use super::{Contact, Load, Matching};
 use crate::inference::map::LANES;
@@ -127,7 +126,7 @@ impl Matching {
         (
             force,
             variance,
-            0.5 * observed.squares - cost - rarity(force) - sums.log + 0.5 * variance.ln(),
+            0.5 * observed.squares - cost - sums.log + 0.5 * variance.ln(),
         )
     }
 }
