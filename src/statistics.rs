@@ -38,7 +38,7 @@ pub(crate) fn midpoint_median(mut values: Vec<f64>) -> f64 {
 
 /// What χ² with so many degrees of freedom is at most, to so many standard deviations beyond its mean.
 #[must_use]
-pub(crate) fn chi_squared(free: f64, deviations: f64) -> f64 {
+pub(crate) fn chi_squared_bound(free: f64, deviations: f64) -> f64 {
     free + deviations * (2.0 * free).sqrt()
 }
 
@@ -47,9 +47,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chi_squared_of_two_has_a_deviation_of_two() {
-        assert_eq!(chi_squared(2.0, 0.0), 2.0);
-        assert_eq!(chi_squared(2.0, 3.0), 8.0);
+    fn the_bound_of_two_has_a_deviation_of_two() {
+        assert_eq!(chi_squared_bound(2.0, 0.0), 2.0);
+        assert_eq!(chi_squared_bound(2.0, 3.0), 8.0);
     }
 
     #[test]

@@ -33,7 +33,7 @@ use super::deviation::TouchDoubts;
 use super::map::{LANES, ResponseMap};
 use super::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
-use crate::statistics::chi_squared;
+use crate::statistics::chi_squared_bound;
 
 pub use self::errors::ReadingErrors;
 
@@ -170,7 +170,7 @@ impl Matching {
         };
         let differs: f64 = channels().map(off).sum();
         let count = channels().count() as f64;
-        let same = (0.5..2.0).contains(&size) && differs < chi_squared(count, 3.0);
+        let same = (0.5..2.0).contains(&size) && differs < chi_squared_bound(count, 3.0);
         same.then_some(Contact {
             force: (found.force * size).min(self.most_force),
             force_deviation: found.force_deviation * size,

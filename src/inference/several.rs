@@ -31,7 +31,7 @@ use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
 use crate::inference::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
-use crate::statistics::chi_squared;
+use crate::statistics::chi_squared_bound;
 
 pub use self::before::{TouchesBefore, TouchesBeside};
 
@@ -424,6 +424,6 @@ fn surely_one(best: &Joint) -> f64 {
 fn is_explained(one: &Contact, channels: usize) -> bool {
     /// Deviations of χ².
     const BEYOND: f64 = 4.0;
-    let noise = chi_squared(channels as f64, BEYOND);
+    let noise = chi_squared_bound(channels as f64, BEYOND);
     one.unexplained < one.strength.min(noise)
 }

@@ -3,7 +3,7 @@
 
 use super::lately::Lately;
 use crate::inference::{Contact, Matching, Several, SeveralTouches, TouchesBefore, TouchesBeside};
-use crate::statistics::chi_squared;
+use crate::statistics::chi_squared_bound;
 use crate::units;
 
 /// Seconds between looks: while what is shown is what was seen, and while it is not. Of several that were seen again and again
@@ -158,7 +158,7 @@ impl Counting {
         (self.last_look, self.felt) = (Some(time_us), squares(matching, strain));
         let (seen, beside) = self.count(matching, strain, one);
         let channels = matching.used.iter().filter(|u| **u).count() as f64;
-        let noise = chi_squared(channels, BEYOND);
+        let noise = chi_squared_bound(channels, BEYOND);
         self.usual = MORE * seen.unexplained + noise;
         let point = SeveralTouches::one(*one, 1.0);
         // Not where it is one because a gauge is odd.

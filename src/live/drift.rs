@@ -185,11 +185,15 @@ impl Drift {
                 continue;
             };
             self.believed = true;
+            let was_loaded = self.creep.loaded;
             self.go_on_to(block.ends_s, None);
             let off = block.mean.iter().zip(self.walk.rest(0.0));
             let off: Vec<f64> = off.map(|(x, b)| x - b).collect();
             let of_mean = noise.iter().map(|n| n * n / block.samples);
             let variance: Vec<f64> = of_mean.zip(strays).map(|(n, s)| n + s).collect();
+            if was_loaded {
+                self.walk.admit(&off, &variance, used, CAUTION);
+            }
             let off = (&off[..], f64::INFINITY);
             let bends = self.creep.bends_by(steps::STRETCH_S);
             if bends < CREEPS {

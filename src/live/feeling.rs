@@ -1,6 +1,6 @@
 //! Whether anything touches: weighted squares against χ² of the channels, with a few samples of patience.
 
-use crate::statistics::chi_squared;
+use crate::statistics::chi_squared_bound;
 
 /// Samples in a row that make or end a touch.
 pub(super) const BEGINS: u32 = 3;
@@ -54,8 +54,8 @@ impl Feeling {
         let gone = !self.touching || self.strange_s >= STRANGE_S || plain < GONE * self.usual;
         let squares = if gone { cautious } else { plain };
         self.usual += (plain - self.usual) * if self.touching { USUAL } else { 1.0 };
-        let begins = channels >= FEWEST && squares > chi_squared(channels, BEGIN);
-        let ends = channels < FEWEST || squares < chi_squared(channels, END);
+        let begins = channels >= FEWEST && squares > chi_squared_bound(channels, BEGIN);
+        let ends = channels < FEWEST || squares < chi_squared_bound(channels, END);
         self.above = if begins { self.above + 1 } else { 0 };
         self.below = if ends { self.below + 1 } else { 0 };
         if !self.touching && self.above >= BEGINS {

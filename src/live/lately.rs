@@ -1,7 +1,7 @@
 //! What is read of the touches that are shown, while no other comes to them: all of it the same but for its size.
 
 use crate::inference::{Matching, SeveralTouches, TouchesBefore};
-use crate::statistics::chi_squared;
+use crate::statistics::chi_squared_bound;
 use crate::units;
 
 /// Seconds that are averaged over.
@@ -106,7 +106,7 @@ impl Lately {
             .map(|(x, y, n)| ((x - size * y) / n).powi(2))
             .sum();
         let count = trusted().count() as f64;
-        let is_off = off > variance * chi_squared(count, OFF);
+        let is_off = off > variance * chi_squared_bound(count, OFF);
         (size, is_off || size.is_nan() || size <= 0.0)
     }
 

@@ -3,7 +3,7 @@
 
 use super::pull;
 use crate::inference::Matching;
-use crate::statistics::chi_squared;
+use crate::statistics::chi_squared_bound;
 
 /// Seconds for which a reading has to stay where it is before it is a level.
 const LEVEL_S: f64 = 0.3;
@@ -75,7 +75,7 @@ fn is_off(matching: &Matching, strain: &[f64], from: &[f64]) -> bool {
     let squares: Vec<f64> = trusted
         .map(|(((x, y), noise), _)| ((x - y) / noise).powi(2))
         .collect();
-    squares.iter().sum::<f64>() > chi_squared(squares.len() as f64, OFF)
+    squares.iter().sum::<f64>() > chi_squared_bound(squares.len() as f64, OFF)
 }
 
 /// Whether something that lets go would read about as well.

@@ -23,8 +23,9 @@ const STEPS: usize = 8;
 const TURNS: usize = 2;
 /// Two touches nearer to each other (m) are one.
 pub(super) const APART: f64 = 12e-3;
-/// Less is no touch (N).
-const LEAST_FORCE: f64 = 0.05;
+/// Less is no touch (N): alone, and one of several, where something so light explains what the model lacks.
+const LEAST_ALONE: f64 = 1e-3;
+const LEAST_OF_SEVERAL: f64 = 0.05;
 
 /// The likeliest spots, and the normal distribution around them.
 #[derive(Clone)]
@@ -201,8 +202,13 @@ impl Matching {
         let columns = DMatrix::from_columns(&readings);
         let solved = columns.tr_mul(&columns).cholesky()?;
         let forces = solved.solve(&columns.tr_mul(&held.reading));
+        let least = if spots.len() > 1 {
+            LEAST_OF_SEVERAL
+        } else {
+            LEAST_ALONE
+        };
         for (spot, force) in spots.iter_mut().zip(forces.iter()) {
-            if !(LEAST_FORCE..f64::INFINITY).contains(force) {
+            if !(least..f64::INFINITY).contains(force) {
                 return None;
             }
             spot.force = force.min(self.most_force);

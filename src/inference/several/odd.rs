@@ -105,7 +105,7 @@ mod tests {
 
     use crate::inference::matching::tests::{CHANNELS, maps};
     use crate::inference::plate::{gauged_plate, plate, read_touches};
-    use crate::inference::{ResponseMap, Several};
+    use crate::inference::{ResponseMap, Several, TouchKind};
 
     #[test]
     fn a_gauge_that_was_right_is_less_likely_odd_until_it_is_not() {
@@ -176,6 +176,21 @@ mod tests {
             let one = matching.find(&off);
             let seen = matching.count(&several, &off, &one);
             assert_eq!(seen.count(), Some(1), "{turn} {seen:?}");
+        }
+    }
+
+    #[test]
+    fn a_light_touch_on_quiet_gauges_is_one() {
+        let errors = ReadingErrors::of_noise(0.02e-6, 8);
+        let mut matching = Matching::new(Arc::new(gauged_plate()), errors, 60.0);
+        let several = Several::new(&matching);
+        for force in [0.03, 0.3] {
+            let reading = read_touches(&matching.map, &[(340, force)]);
+            let one = matching.find(&reading);
+            let seen = matching.count(&several, &reading, &one);
+            assert!(seen.count() == Some(1), "{seen:?}");
+            assert!(matches!(seen.kind, TouchKind::Points), "{seen:?}");
+            assert!((seen.contacts[0].force - force).abs() < 0.01, "{seen:?}");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::inference::TouchKind;
-use crate::statistics::chi_squared;
+use crate::statistics::chi_squared_bound;
 
 const CHANNELS: usize = 10;
 const NOISE: f64 = 0.5e-6;
@@ -65,7 +65,7 @@ fn the_end_of_a_touch_is_no_rest() {
         for goes_s in [0.06, 0.1, 0.2, 0.4] {
             let squares = squares_after(felt * NOISE, goes_s);
             // A touch would end.
-            let noise = chi_squared(CHANNELS as f64, 4.0);
+            let noise = chi_squared_bound(CHANNELS as f64, 4.0);
             assert!(squares < noise, "{felt} {goes_s} {squares}");
         }
     }

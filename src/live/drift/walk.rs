@@ -23,7 +23,7 @@ mod tests;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::steps::Steps;
-use crate::statistics::{chi_squared, mean, median};
+use crate::statistics::{chi_squared_bound, mean, median};
 
 /// What a channel walks by in a second at least, and what all do together beside their speed (strain): a workshop is never
 /// quite still.
@@ -258,6 +258,22 @@ impl RestWalk {
         expected.map_or(0.0, |e| e.squares(than) - e.squares(off))
     }
 
+    /// As far as readings without a touch (strain, with their variances, strain²) are more off from the rest than was thought
+    /// possible, it is known less well: of so many times the variance at most. What one correction would leave of it otherwise
+    /// is in directions of which the filter was wrongly sure, and would be taken for a touch (adaptive fading: Q. Xia, M. Rao,
+    /// Y. Ying and X. Shen, Automatica 30, 1994).
+    pub fn admit(&mut self, off: &[f64], variance: &[f64], used: &[bool], most: f64) {
+        let Some(expected) = self.innovation(variance, used, &[]) else {
+            return;
+        };
+        let count = expected.trusted.len().max(1) as f64;
+        let share = (expected.squares(off) / count).clamp(1.0, most);
+        let n = self.channels();
+        let more = self.rest_covariance(0.0, false) * (share - 1.0);
+        let mut own = self.covariance.view_mut((0, 0), (n, n));
+        own += more;
+    }
+
     /// Corrects the rest by what readings are off from it without a touch, with their variances (strain, strain²) and the
     /// ways in which the touch may be another one. By how much b is another then (strain); nothing where the readings are
     /// farther off than so many standard deviations of χ².
@@ -274,7 +290,7 @@ impl RestWalk {
             return None;
         };
         let count = expected.trusted.len() as f64;
-        if expected.squares(off) > chi_squared(count, most) {
+        if expected.squares(off) > chi_squared_bound(count, most) {
             return None;
         }
         let off = among(off, &expected.trusted);

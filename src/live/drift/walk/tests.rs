@@ -126,6 +126,37 @@ fn channels_that_drift_unevenly_are_told_and_stay_so() {
     assert!(mean.abs() < 1e-9, "{mean}");
 }
 
+/// What three channels hid is farther off than was thought: how much one correction at rest leaves of it, in all (strain).
+fn left_of_hidden(by: f64, is_admitted: bool) -> f64 {
+    let mut walk = Simulated {
+        hidden: 3,
+        from_s: 3.0,
+        ..AT_REST
+    }
+    .followed(120.0);
+    let (variance, used) = ([NOISE * NOISE; N], [true; N]);
+    let hid = [by, -by, by, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let before: Vec<f64> = walk.rest(0.0).collect();
+    if is_admitted {
+        walk.admit(&hid, &variance, &used, 16.0);
+    }
+    let all = (&hid[..], f64::INFINITY);
+    walk.correct(all, &variance, &used, &[]).unwrap();
+    let moved = walk.rest(0.0).zip(before).map(|(b, was)| b - was);
+    hid.iter().zip(moved).map(|(h, m)| (h - m).abs()).sum()
+}
+
+#[test]
+fn what_is_farther_off_than_was_thought_is_believed() {
+    let by = 6e-6;
+    let [trusting, admitted] = [false, true].map(|is_admitted| left_of_hidden(by, is_admitted));
+    assert!(trusting > 3.0 * NOISE, "{trusting}");
+    assert!(admitted < 0.6 * trusting, "{admitted} of {trusting}");
+    // What noise may do changes nothing.
+    let [trusting, admitted] = [false, true].map(|is_admitted| left_of_hidden(1e-6, is_admitted));
+    assert_eq!(trusting, admitted);
+}
+
 #[test]
 fn what_comes_at_once_is_no_drift() {
     let mut walk = Simulated {
