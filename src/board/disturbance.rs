@@ -10,7 +10,8 @@ use crate::draw::normal;
 /// How much of each there is; nothing by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Disturbances {
-    /// Amplitude (strain) and frequency (Hz) of what the mains induce, in every channel at a phase of its own.
+    /// Amplitude (strain) and frequency (Hz) of what the mains induce, in every channel at a phase of its own; the frequency
+    /// wanders as that of a grid does.
     pub hum: Option<(f64, f64)>,
     /// What all channels drift by together, as a part that is warmed (strain in a second).
     pub warming: f64,
@@ -90,7 +91,7 @@ impl Disturbed {
     pub fn felt(&mut self, c: usize, felt: f64, seconds: f64, step: f64) -> f64 {
         let mut strain = felt + self.wandered + self.speeds[c] * seconds;
         if let Some((amplitude, hertz)) = self.what.hum {
-            strain += amplitude * (TAU * hertz * seconds + self.phases[c]).sin();
+            strain += amplitude * (grid_phase(hertz, seconds) + self.phases[c]).sin();
         }
         if let Some((share, time)) = self.what.creep {
             let crept = &mut self.crept[c];
@@ -111,6 +112,15 @@ impl Disturbed {
             strains[c] += share * (strains[c - 1] - strains[c]);
         }
     }
+}
+
+/// How far (rad) a grid of a mean frequency (Hz) has come at a time (s): as supply and load fall apart it hurries and lags a
+/// little, within seconds.
+fn grid_phase(hertz: f64, seconds: f64) -> f64 {
+    /// Hz and s.
+    const OFF: f64 = 0.03;
+    const WITHIN: f64 = 20.0;
+    TAU * hertz * seconds + OFF * WITHIN * (1.0 - (TAU * seconds / WITHIN).cos())
 }
 
 #[cfg(test)]
@@ -161,10 +171,18 @@ mod tests {
             let of = |half: &[f64]| half.iter().sum::<f64>() / half.len() as f64;
             // A second's mean, one second later: whole periods of hum are nothing.
             let drifted = of(&read[1000..]) - of(&read[..1000]);
-            assert!((drifted - 2e-6).abs() < 1e-9, "{drifted}");
+            assert!((drifted - 2e-6).abs() < 5e-9, "{drifted}");
             let most = read[..20].iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             assert!((4.9e-6..5.1e-6).contains(&most), "{most}");
         }
+    }
+
+    #[test]
+    fn a_grid_hurries_and_lags_by_little_and_keeps_its_mean() {
+        let hertz =
+            |at: f64| (grid_phase(50.0, at + 1e-3) - grid_phase(50.0, at - 1e-3)) / (2e-3 * TAU);
+        assert!((hertz(5.0) - 50.03).abs() < 1e-4 && (hertz(15.0) - 49.97).abs() < 1e-4);
+        assert!((grid_phase(50.0, 60.0) / TAU - 3000.0).abs() < 1e-9);
     }
 
     #[test]

@@ -240,7 +240,8 @@ impl ScriptedPress {
         })
     }
 
-    /// Of the largest force at a time.
+    /// Of the largest force at a time: a hand presses and lets go with the least jerk (T. Flash and N. Hogan, J. Neuroscience 5,
+    /// 1985).
     fn share(&self, seconds: f64) -> f64 {
         let since = seconds - self.start_s;
         if !(0.0..self.duration_s).contains(&since) {
@@ -249,7 +250,7 @@ impl ScriptedPress {
         let ramp = self.ramp_s.min(self.duration_s / 2.0).max(1e-9);
         let near = since.min(self.duration_s - since) / ramp;
         let t = near.clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
+        t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t)
     }
 }
 

@@ -25,6 +25,10 @@ pub struct World {
     walk: f64,
     hum: f64,
     hum_hz: f64,
+    /// By how much its frequency wanders (Hz) in twenty seconds.
+    wanders_hz: f64,
+    /// Share of a force by which a hand trembles.
+    trembles: f64,
     /// Share of a load that is read in addition after a long while.
     creep: f64,
 }
@@ -38,6 +42,8 @@ pub const CALM: World = World {
     walk: 0.1e-6,
     hum: 0.0,
     hum_hz: 50.0,
+    wanders_hz: 0.0,
+    trembles: 0.0,
     creep: 0.0,
 };
 
@@ -52,9 +58,10 @@ pub struct Press {
 impl Press {
     pub fn share(&self, now: f64) -> f64 {
         let since = now - self.from;
-        (since / self.ramp)
-            .min((self.lasts - since) / self.ramp)
-            .clamp(0.0, 1.0)
+        let near = since.min(self.lasts - since) / self.ramp;
+        let x = near.clamp(0.0, 1.0);
+        // With the least jerk.
+        x.powi(3) * (10.0 - 15.0 * x + 6.0 * x * x)
     }
 }
 
@@ -104,13 +111,15 @@ pub fn run(
         let on = presses.iter().position(|p| p.share(now) > 0.0);
         let load = |c: usize| -> f64 {
             let all = presses.iter().zip(&read);
-            all.map(|(p, read)| p.share(now) * read[c]).sum()
+            let trembling = 1.0 + world.trembles * (TAU * 8.3 * now).sin();
+            trembling * all.map(|(p, read)| p.share(now) * read[c]).sum::<f64>()
         };
         let counts = (0..gauges)
             .map(|c| {
                 walked[c] += world.walk / world.rate.sqrt() * normal(&mut rng);
                 crept[c] += (world.creep * load(c) - crept[c]) / (CREEPS_S * world.rate);
-                let hum = world.hum * (TAU * (world.hum_hz * now + phases[c])).sin();
+                let wandered = world.wanders_hz * 20.0 * (TAU * now / 20.0).sin() / TAU;
+                let hum = world.hum * (TAU * (world.hum_hz * now + wandered + phases[c])).sin();
                 let strain = load(c)
                     + crept[c]
                     + walked[c]
@@ -314,15 +323,31 @@ fn rest_is_quiet() {
 #[test]
 fn mains_hum_is_no_touch() {
     let mut all = Vec::new();
-    for (hum, hum_hz) in [(5e-6, 50.03), (20e-6, 49.95), (20e-6, 60.02)] {
+    for (hum, hum_hz, wanders_hz) in [
+        (5e-6, 50.03, 0.0),
+        (20e-6, 49.95, 0.0),
+        (20e-6, 60.02, 0.0),
+        (8e-6, 49.93, 0.03),
+        (20e-6, 49.97, 0.05),
+    ] {
         let world = World {
             hum,
             hum_hz,
+            wanders_hz,
+            trembles: wanders_hz,
             ..CALM
         };
-        let at = |k: usize| 4.0 + 2.0 * k as f64;
-        let presses: Vec<Press> = (0..20).map(|k| press(k, 1.5, at(k), 0.7)).collect();
-        print!("{hum:e} {hum_hz}: ");
+        // Those that come so soon after one another leave no second of rest to look at.
+        let (every, hard) = if wanders_hz > 0.0 {
+            (1.5, 12.0)
+        } else {
+            (2.0, 1.5)
+        };
+        let force = |k: usize| if k % 2 == 0 { 1.5 } else { hard };
+        let presses: Vec<Press> = (0..20)
+            .map(|k| press(k, force(k), 4.0 + every * k as f64, 0.7))
+            .collect();
+        print!("{hum:e} {hum_hz} ± {wanders_hz}: ");
         all.push(Seen::of(world, &presses, 45.0));
         print!("untouched: ");
         all.push(Seen::of(world, &[], 60.0));

@@ -10,7 +10,8 @@ use crate::cli::ranges::between;
 /// What there is in the readings beside touches.
 #[derive(Args, Debug, Clone)]
 pub struct DisturbanceArgs {
-    /// Mains hum in every channel: amplitude (microstrain) and frequency (Hz; 50 when left out), as 20 or 20@60.
+    /// Mains hum in every channel: amplitude (microstrain) and mean frequency (Hz; 50 when left out), as 20 or 20@60. It wanders by
+    /// 0.03 Hz, as that of a grid.
     #[arg(long, value_parser = hum)]
     pub hum: Option<(f64, f64)>,
     /// What all channels drift by together (microstrain a second), as a part that is warmed.
