@@ -3,7 +3,12 @@
 //! A line of known frequency is a cosine and a sine of each channel. They are fitted by least squares to a second of rest;
 //! how the phase turns between its halves gives the frequency to a few millihertz. From then on they follow the signal
 //! slowly (B. Widrow et al., Proc. IEEE 63, 1692, 1975), also under a touch: its ends are off by more than the rest ever
-//! was, and move them no further than that.
+//! was, and move them no further than that. Where there is no second of rest they are looked for behind what touches
+//! ([`behind`]).
+
+mod behind;
+#[cfg(test)]
+mod tests;
 
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
@@ -56,7 +61,9 @@ pub(super) struct Hum {
     usual: Vec<f64>,
     now_s: f64,
     rested: HumSamples,
-    /// When it was last looked for.
+    /// The last samples, be they at rest or not, without the lines.
+    recent: HumSamples,
+    /// When lines were last looked for.
     looked_s: f64,
 }
 
@@ -70,6 +77,7 @@ impl Hum {
             self.lines.clear();
             self.level = Level::default();
             self.rested.clear();
+            self.recent.clear();
         }
         if at_rest {
             self.rested.push_back((self.now_s, counts.to_vec()));
@@ -85,6 +93,9 @@ impl Hum {
             }
         }
         self.follow(seconds, counts);
+        self.recent.push_back((self.now_s, counts.to_vec()));
+        keep_the_last(&mut self.recent);
+        self.look_behind();
     }
 
     /// What is left of a sample (counts) moves the lines a little, and the level they stand on.
@@ -119,16 +130,8 @@ impl Hum {
 
     /// Looks for lines in so much rest as there is, now and then.
     fn look(&mut self) {
-        while self.rested.len() > MOST
-            || (self.rested.front()).is_some_and(|(at, _)| self.now_s - at > LOOKED_S)
-        {
-            self.rested.pop_front();
-        }
-        let long = self
-            .rested
-            .front()
-            .is_some_and(|(at, _)| self.now_s - at > 0.95 * LOOKED_S);
-        if !long || self.now_s - self.looked_s < LOOKED_S {
+        keep_the_last(&mut self.rested);
+        if !is_long(&self.rested) || self.now_s - self.looked_s < LOOKED_S {
             return;
         }
         self.looked_s = self.now_s;
@@ -147,6 +150,18 @@ impl Hum {
                 line.phase -= TAU * line.hertz * (last - before);
             }
         }
+    }
+
+    /// Looks for another line where there has been no second of rest for as long.
+    fn look_behind(&mut self) {
+        let is_due = self.now_s - self.looked_s >= 2.0 * LOOKED_S && is_long(&self.recent);
+        if !is_due || self.lines.len() >= LINES {
+            return;
+        }
+        self.looked_s = self.now_s - LOOKED_S;
+        let rate = rate(&self.recent);
+        let near = unknown(&self.lines, rate);
+        (self.lines).extend(behind::line_near(&self.recent, rate, &near));
     }
 
     /// Takes the lines of some rest (s, counts) for what hums from its last sample on, and off these.
@@ -188,22 +203,42 @@ impl Level {
     }
 }
 
+/// Lets go of what is older than is looked at.
+fn keep_the_last(rows: &mut HumSamples) {
+    let last = rows.back().map_or(0.0, |row| row.0);
+    while rows.len() > MOST || rows.front().is_some_and(|row| last - row.0 > LOOKED_S) {
+        rows.pop_front();
+    }
+}
+
+/// Seconds from the first to the last.
+fn lasted(rows: &HumSamples) -> f64 {
+    let ends = rows.front().zip(rows.back());
+    ends.map_or(0.0, |(first, last)| last.0 - first.0)
+}
+
+/// Whether they are enough to look at.
+fn is_long(rows: &HumSamples) -> bool {
+    rows.len() == MOST || lasted(rows) > 0.95 * LOOKED_S
+}
+
+/// Samples a second.
+fn rate(rows: &HumSamples) -> f64 {
+    rows.len().saturating_sub(1) as f64 / lasted(rows)
+}
+
 /// The lines of some samples, with their phases at the last one, and what is left of the samples without them.
 fn lines(rows: &HumSamples) -> (Vec<HumLine>, HumSamples) {
     let mut left = rows.clone();
     let mut found: Vec<HumLine> = Vec::new();
-    let (Some(first), Some(last)) = (rows.front(), rows.back()) else {
-        return (found, left);
-    };
-    let (lasted, channels) = (last.0 - first.0, first.1.len());
-    if lasted < LEAST_S || channels == 0 {
+    let channels = rows.front().map_or(0, |row| row.1.len());
+    if lasted(rows) < LEAST_S || channels == 0 {
         return (found, left);
     }
-    let rate = (rows.len() - 1) as f64 / lasted;
+    let rate = rate(rows);
     while found.len() < LINES {
         let middle = level(&left);
-        let known = |hertz: &f64| found.iter().all(|l| (l.hertz - hertz).abs() > 2.0 * OFF);
-        let best = (candidates(rate).into_iter().filter(known))
+        let best = (unknown(&found, rate).into_iter())
             .map(|hertz| (strength(&left, &middle, hertz), hertz))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((strength, hertz)) = best else {
@@ -219,6 +254,13 @@ fn lines(rows: &HumSamples) -> (Vec<HumLine>, HumSamples) {
         found.push(line);
     }
     (found, left)
+}
+
+/// Frequencies at which mains may show that are of no line yet.
+fn unknown(lines: &[HumLine], rate: f64) -> Vec<f64> {
+    let mut all = candidates(rate);
+    all.retain(|hertz| lines.iter().all(|l| (l.hertz - hertz).abs() > 2.0 * OFF));
+    all
 }
 
 /// Frequencies at which mains may show: what is faster than half the rate shows as a slower one.
@@ -339,136 +381,5 @@ impl HumLine {
                 *value -= a * cos + b * sin;
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// White, more or less (splitmix64): −3 to 3.
-    fn noise(k: u32, of: u64) -> f64 {
-        let z = (2 * u64::from(k) + of + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % 7) as f64 - 3.0
-    }
-
-    /// Two channels that hum, over a level, with noise.
-    fn read(k: u32, rate: f64, hertz: f64, size: f64) -> (f64, [f64; 2]) {
-        let now = f64::from(k) / rate;
-        let hum = |turned: f64| size * (TAU * hertz * now + turned).sin();
-        (
-            now,
-            [
-                2000.0 + hum(0.3) + noise(k, 0),
-                900.0 - 0.5 * hum(1.9) + noise(k, 1),
-            ],
-        )
-    }
-
-    #[test]
-    fn hum_is_found_at_its_frequency_and_taken_off() {
-        for (rate, hertz) in [
-            (1000.0, 49.93),
-            (1000.0, 60.05),
-            (400.0, 100.1),
-            (4000.0, 50.0),
-            (90.0, 50.02),
-        ] {
-            let mut hum = Hum::default();
-            let mut left = Vec::new();
-            for k in 0..(4.0 * rate) as u32 {
-                let (now, mut counts) = read(k, rate, hertz, 20.0);
-                hum.take_off(if k == 0 { 0.0 } else { rate.recip() }, &mut counts, true);
-                if now > 2.0 {
-                    left.push(counts[0] - 2000.0);
-                }
-            }
-            let rms = (left.iter().map(|x| x * x).sum::<f64>() / left.len() as f64).sqrt();
-            assert!(rms < 2.3, "{rate} {hertz}: {rms}, {:?}", hum.lines);
-            let shown = (hertz - (hertz / rate).round() * rate).abs();
-            assert!((hum.lines[0].hertz - shown).abs() < 0.02, "{:?}", hum.lines);
-            assert!((hum.rms(0) - 14.14).abs() < 0.5);
-        }
-    }
-
-    /// Also where a board sends four samples a period, and somebody drums on the limb.
-    #[test]
-    fn what_hums_goes_on_behind_steep_touches_at_any_rate() {
-        for rate in [200.0, 250.0, 1000.0] {
-            let mut hum = Hum::default();
-            let mut worst = 0.0_f64;
-            for k in 0..(13.0 * rate) as u32 {
-                let (now, mut counts) = read(k, rate, 50.03, 20.0);
-                let drums = (3.0..12.0).contains(&now);
-                let pressed = if drums && now % 0.5 < 0.12 {
-                    1500.0
-                } else {
-                    0.0
-                };
-                counts[0] += pressed;
-                let step_s = if k == 0 { 0.0 } else { rate.recip() };
-                hum.take_off(step_s, &mut counts, now < 3.0);
-                if now > 3.0 {
-                    worst = worst.max((counts[0] - 2000.0 - pressed).abs());
-                }
-            }
-            assert!(worst < 6.0, "{rate} Hz: {worst}");
-        }
-    }
-
-    /// A grid wanders, while a hand that trembles presses a second and lets go for half of one: no second of rest to look at.
-    #[test]
-    fn what_hums_is_followed_where_its_frequency_wanders_and_hands_tremble() {
-        for rate in [250.0, 500.0, 1000.0] {
-            let mut hum = Hum::default();
-            let mut worst = 0.0_f64;
-            for k in 0..(40.0 * rate) as u32 {
-                let now = f64::from(k) / rate;
-                let wander = 0.05 * 20.0 / TAU * (1.0 - (TAU * now / 20.0).cos());
-                let at = 49.93 * now + wander;
-                let (_, mut counts) = read(k, rate, 0.0, 0.0);
-                let of = [20.0, -10.0].map(|size| size * (TAU * at).sin());
-                for (count, of) in counts.iter_mut().zip(of) {
-                    *count += of;
-                }
-                let is_touched = now > 3.0 && now % 1.5 < 1.0;
-                let pressed = if is_touched {
-                    1500.0 * (1.0 + 0.04 * (TAU * 8.3 * now).sin())
-                } else {
-                    0.0
-                };
-                counts[0] += pressed;
-                let step_s = if k == 0 { 0.0 } else { rate.recip() };
-                hum.take_off(step_s, &mut counts, !is_touched);
-                if now > 3.0 {
-                    worst = worst.max((counts[0] - 2000.0 - pressed).abs());
-                }
-            }
-            assert!(worst < 6.0, "{rate} Hz: {worst}");
-        }
-    }
-
-    #[test]
-    fn a_touch_is_no_hum_and_does_not_move_what_hums() {
-        let mut hum = Hum::default();
-        let mut worst = 0.0_f64;
-        for k in 0..6000 {
-            let (now, mut counts) = read(k, 1000.0, 50.0, 20.0);
-            let pressed = if now > 3.0 { 400.0 } else { 0.0 };
-            counts[0] += pressed;
-            hum.take_off(0.001, &mut counts, now < 3.0);
-            if now > 3.0 {
-                worst = worst.max((counts[0] - 2000.0 - pressed).abs());
-            }
-        }
-        assert!(worst < 5.0, "{worst}");
-        let mut calm = Hum::default();
-        for k in 0..3000 {
-            let (_, mut counts) = read(k, 1000.0, 50.0, 0.0);
-            calm.take_off(0.001, &mut counts, true);
-        }
-        assert!(calm.lines.is_empty(), "{:?}", calm.lines);
     }
 }
