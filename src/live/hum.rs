@@ -7,12 +7,15 @@
 //! ([`behind`]).
 
 mod behind;
+mod line;
 #[cfg(test)]
 mod tests;
 
-use std::collections::VecDeque;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
+pub(super) use self::line::HumSamples;
+
+use self::line::{CLEAR, HumLine, waves};
 use crate::statistics::{chi_squared_bound, mean};
 
 /// Mains, and how many of its harmonics are looked for (Hz).
@@ -27,30 +30,11 @@ const LEAST_S: f64 = 0.3;
 const MOST: usize = 4000;
 /// Lines at once.
 const LINES: usize = 4;
-/// Over what noise would do, in deviations: then it is a line.
-const CLEAR: f64 = 12.0;
-/// Seconds in which a line follows the signal.
-const FOLLOWS_S: f64 = 0.3;
 /// The level that lines stand on is followed in so many radians of the slowest of them: a hand trembles at 6 to 12 Hz, and is to
 /// be told from mains.
 const LEVEL_RAD: f64 = 3.0;
-/// What is off by more than so many times what is usual at rest is a touch that comes or goes, and moves a line no further.
-const UNUSUAL: f64 = 4.0;
 /// Mean absolute value of what rounding to counts does.
 const ROUNDING: f64 = 0.25;
-
-/// One frequency.
-#[derive(Clone, Debug)]
-struct HumLine {
-    hertz: f64,
-    /// At the last sample (rad).
-    phase: f64,
-    /// Of its cosine and its sine in every channel (counts).
-    waves: Vec<[f64; 2]>,
-}
-
-/// Samples: when (s), and what every channel read.
-pub(super) type HumSamples = VecDeque<(f64, Vec<f64>)>;
 
 /// What hums.
 #[derive(Clone, Debug, Default)]
@@ -288,26 +272,6 @@ fn scatter(rows: &HumSamples) -> Vec<f64> {
     middle.iter().enumerate().map(of).collect()
 }
 
-/// Cosine and sine of every channel at a frequency, in some of the samples, with phases from the last one.
-fn waves<'a>(
-    rows: impl Iterator<Item = &'a (f64, Vec<f64>)>,
-    last_s: f64,
-    level: &[f64],
-    hertz: f64,
-) -> Vec<[f64; 2]> {
-    let mut sums = vec![[0.0; 2]; level.len()];
-    let mut count = 0.0;
-    for (at, values) in rows {
-        let (sin, cos) = (TAU * hertz * (at - last_s)).sin_cos();
-        for ((sum, value), level) in sums.iter_mut().zip(values).zip(level) {
-            sum[0] += (value - level) * cos;
-            sum[1] += (value - level) * sin;
-        }
-        count += 1.0;
-    }
-    (sums.into_iter().map(|s| s.map(|v| 2.0 * v / count))).collect()
-}
-
 /// Over the scatter of each channel: as χ² where there is noise alone, the largest near a frequency.
 fn strength(rows: &HumSamples, level: &[f64], hertz: f64) -> f64 {
     let last = rows.back().map_or(0.0, |r| r.0);
@@ -328,58 +292,4 @@ fn strength(rows: &HumSamples, level: &[f64], hertz: f64) -> f64 {
         .map(|off| at(hertz + off))
         .into_iter()
         .fold(0.0, f64::max)
-}
-
-impl HumLine {
-    /// The line near a frequency that fits samples best.
-    fn fitted(rows: &HumSamples, level: &[f64], mut hertz: f64) -> Self {
-        let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
-        let half = rows.len() / 2;
-        for _ in 0..3 {
-            let halves = [(0, half), (half, 2 * half)];
-            let [a, b] = halves.map(|(from, to)| waves(rows.range(from..to), last, level, hertz));
-            // What turns from one half to the other, over all channels.
-            let (mut re, mut im) = (0.0, 0.0);
-            for ([ac, a_s], [bc, b_s]) in a.iter().zip(&b) {
-                re += ac * bc + a_s * b_s;
-                im += ac * b_s - a_s * bc;
-            }
-            let turned = im.atan2(re).clamp(-0.9 * PI, 0.9 * PI);
-            hertz -= turned / TAU / (0.5 * (last - first));
-        }
-        Self {
-            waves: waves(rows.iter(), last, level, hertz),
-            phase: 0.0,
-            hertz,
-        }
-    }
-
-    /// Goes a little way with what a sample is off the level (counts), beside what is usual; and where all channels turn alike,
-    /// its frequency does: a loop of second order, critically damped (F. Gardner, Phaselock Techniques, 2005).
-    fn follow(&mut self, seconds: f64, off: &[f64], usual: &[f64]) {
-        let follows = (seconds / FOLLOWS_S).min(0.1);
-        let (sin, cos) = self.phase.sin_cos();
-        let (mut turned, mut size) = (0.0, 0.0);
-        for (([a, b], off), usual) in self.waves.iter_mut().zip(off).zip(usual) {
-            let most = UNUSUAL * usual;
-            let by = 2.0 * follows * off.max(-most).min(most);
-            turned += by * (*b * cos - *a * sin);
-            // What hardly hums tells nothing of its frequency.
-            size += *a * *a + *b * *b + usual * usual;
-            (*a, *b) = (*a + by * cos, *b + by * sin);
-        }
-        if size > 0.0 {
-            self.hertz += turned / size / (4.0 * FOLLOWS_S) / TAU;
-        }
-    }
-
-    fn take_from(&self, rows: &mut HumSamples) {
-        let last = rows.back().map_or(0.0, |r| r.0);
-        for (at, values) in rows {
-            let (sin, cos) = (TAU * self.hertz * (*at - last)).sin_cos();
-            for (value, [a, b]) in values.iter_mut().zip(&self.waves) {
-                *value -= a * cos + b * sin;
-            }
-        }
-    }
 }

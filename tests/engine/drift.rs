@@ -351,7 +351,7 @@ fn mains_hum_is_no_touch() {
         } else {
             (2.0, 1.5)
         };
-        let force = |k: usize| if k % 2 == 0 { 1.5 } else { hard };
+        let force = |k: usize| if k.is_multiple_of(2) { 1.5 } else { hard };
         let presses: Vec<Press> = (0..20)
             .map(|k| press(k, force(k), 4.0 + every * k as f64, 0.7))
             .collect();

@@ -6,7 +6,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{CLEAR, HumLine, HumSamples};
+use super::line::{CLEAR, HumLine, HumSamples, turned};
 use crate::statistics::{chi_squared_bound, median};
 
 /// Periods of a stretch, the fewest samples that tell a wave from a parabola, and the fewest stretches.
@@ -103,12 +103,7 @@ impl Stretches {
     fn faster_by(&self) -> f64 {
         let half = self.waves.len() / 2;
         let [later, earlier] = [0..half, half..2 * half].map(|part| self.medians(part));
-        let (mut re, mut im) = (0.0, 0.0);
-        for ([ac, a_s], [bc, b_s]) in earlier.iter().zip(&later) {
-            re += ac * bc + a_s * b_s;
-            im += ac * b_s - a_s * bc;
-        }
-        -im.atan2(re) / TAU / (half as f64 * self.lasts_s)
+        -turned(&earlier, &later) / TAU / (half as f64 * self.lasts_s)
     }
 }
 
@@ -156,7 +151,9 @@ fn parabola_of(stretch: &[&(f64, Vec<f64>)]) -> Option<Vec<Vec<f64>>> {
         let mut own: Vec<f64> = since.map(|t| t.powi(power)).collect();
         free_of(&mut own, &directions);
         let length = dot(&own, &own).sqrt();
-        own.iter_mut().for_each(|v| *v /= length);
+        for v in &mut own {
+            *v /= length;
+        }
         directions.push(own);
     }
     Some(directions)
@@ -166,10 +163,9 @@ fn parabola_of(stretch: &[&(f64, Vec<f64>)]) -> Option<Vec<Vec<f64>>> {
 fn free_of(values: &mut [f64], directions: &[Vec<f64>]) {
     for direction in directions {
         let share = dot(values, direction);
-        values
-            .iter_mut()
-            .zip(direction)
-            .for_each(|(v, d)| *v -= share * d);
+        for (v, d) in values.iter_mut().zip(direction) {
+            *v -= share * d;
+        }
     }
 }
 

@@ -140,7 +140,9 @@ fn begun_behind(rate: f64, size: f64, begins_s: f64, from_s: f64) -> (f64, usize
         } else {
             0.0
         };
-        counts.iter_mut().for_each(|count| *count += pressed);
+        for count in &mut counts {
+            *count += pressed;
+        }
         let at_rest = !tapped && (now < begins_s || now > from_s);
         hum.take_off(
             if k == 0 { 0.0 } else { rate.recip() },
