@@ -145,7 +145,7 @@ impl Hum {
         self.looked_s = self.now_s - LOOKED_S;
         let rate = rate(&self.recent);
         let near = unknown(&self.lines, rate);
-        (self.lines).extend(behind::line_near(&self.recent, rate, &near));
+        (self.lines).extend(behind::line_near(&self.recent, rate, &near, &self.usual));
     }
 
     /// Takes the lines of some rest (s, counts) for what hums from its last sample on, and off these.

@@ -15,18 +15,26 @@ const SAMPLES: f64 = 8.0;
 const STRETCHES: usize = 8;
 /// A grid is off by less (Hz), unless it falls apart.
 const OFF: f64 = 0.2;
-/// Variance of a median over that of a mean, and the deviation over the median of absolute values, of normal numbers.
+/// Of normal numbers: the variance of a median over that of a mean, their deviation over the median of absolute values, and their
+/// variance over the square of the mean of these.
 const OF_MEDIAN: f64 = PI / 2.0;
 const OF_ABSOLUTE: f64 = 1.4826;
+const OF_NOISE: f64 = PI / 2.0;
 
-/// The clearest line near some frequencies (Hz) in samples at a rate (Hz), with its phase at the last one, if there is any.
-pub(super) fn line_near(rows: &HumSamples, rate: f64, near: &[f64]) -> Option<HumLine> {
+/// The largest line near some frequencies (Hz) in samples at a rate (Hz), with its phase at the last one, if there is any that is
+/// clear; without lines samples are usually off by so much (counts, mean of the absolute values).
+pub(super) fn line_near(
+    rows: &HumSamples,
+    rate: f64,
+    near: &[f64],
+    usual: &[f64],
+) -> Option<HumLine> {
     let tried = near
         .iter()
         .flat_map(|hertz| [-OFF, 0.0, OFF].map(|off| hertz + off));
     let found = tried.filter_map(|hertz| Stretches::of(rows, rate, hertz));
     // A large line shows at its harmonics too, but as a smaller one.
-    let clear = found.filter(Stretches::is_clear);
+    let clear = found.filter(|stretches| stretches.is_clear(usual));
     let best = clear.max_by(|a, b| a.size().total_cmp(&b.size()))?;
     let nearer = Stretches::of(rows, rate, best.hertz + best.faster_by())?;
     Some(HumLine {
@@ -39,7 +47,8 @@ pub(super) fn line_near(rows: &HumSamples, rate: f64, near: &[f64]) -> Option<Hu
 /// The waves of one frequency in stretches of samples, one after the other.
 struct Stretches {
     hertz: f64,
-    /// Seconds of each.
+    /// Samples and seconds of each.
+    samples: usize,
     lasts_s: f64,
     /// Of each stretch and channel, cosine and sine with phases from the last sample (counts).
     waves: Vec<Vec<[f64; 2]>>,
@@ -59,6 +68,7 @@ impl Stretches {
         }
         (waves.len() >= STRETCHES).then_some(Self {
             hertz,
+            samples,
             lasts_s: samples as f64 / rate,
             waves,
         })
@@ -84,7 +94,7 @@ impl Stretches {
     }
 
     /// Whether squares of the medians over their variances, χ² of two a channel, are more than of noise.
-    fn is_clear(&self) -> bool {
+    fn is_clear(&self, usual: &[f64]) -> bool {
         let count = self.waves.len() as f64;
         let medians = self.medians(0..self.waves.len());
         let squares = medians.iter().enumerate().map(|(c, middle)| {
@@ -92,7 +102,10 @@ impl Stretches {
                 let off = self.waves.iter().map(|w| (w[c][part] - middle[part]).abs());
                 (OF_ABSOLUTE * median(off).unwrap_or(0.0)).powi(2)
             };
-            let variance = OF_MEDIAN * f64::midpoint(apart(0), apart(1)) / count;
+            // A few stretches may happen to be alike, the more so where counts are coarse.
+            let noise = usual.get(c).map_or(0.0, |usual| OF_NOISE * usual * usual);
+            let least = 2.0 * noise / self.samples as f64;
+            let variance = OF_MEDIAN * f64::midpoint(apart(0), apart(1)).max(least) / count;
             (middle[0].powi(2) + middle[1].powi(2)) / variance.max(f64::MIN_POSITIVE)
         });
         let free = 2.0 * medians.len() as f64;

@@ -2,7 +2,7 @@ use super::*;
 
 /// White, more or less (splitmix64): −3 to 3.
 fn noise(k: u32, of: u64) -> f64 {
-    let z = (2 * u64::from(k) + of + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let z = (4 * u64::from(k) + of + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) % 7) as f64 - 3.0
@@ -174,6 +174,22 @@ fn what_begins_to_hum_behind_touches_is_found() {
 fn taps_are_no_hum() {
     for rate in [200.0, 500.0, 1000.0] {
         let (_, lines) = begun_behind(rate, 0.0, 6.0, 9.5);
+        assert_eq!(lines, 0, "{rate} Hz");
+    }
+}
+
+/// Hours of touches on a slow board of coarse counts.
+#[test]
+fn noise_behind_a_touch_is_no_hum() {
+    for rate in [60.0_f64, 100.0, 120.0, 200.0] {
+        let mut hum = Hum::default();
+        let mut lines = 0;
+        for k in 0..(3600.0 * rate) as u32 {
+            let step_s = if k == 0 { 0.0 } else { rate.recip() };
+            let mut counts = [0, 1, 2, 3].map(|of| (noise(k, of) / 4.0).round());
+            hum.take_off(step_s, &mut counts, k < 3 * rate as u32);
+            lines = lines.max(hum.lines.len());
+        }
         assert_eq!(lines, 0, "{rate} Hz");
     }
 }
