@@ -90,6 +90,7 @@ impl HumLine {
         }
     }
 
+    /// Takes the line off samples of which its phase is that of the last one.
     pub fn take_from(&self, rows: &mut HumSamples) {
         let last = rows.back().map_or(0.0, |r| r.0);
         for (at, values) in rows {
