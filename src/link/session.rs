@@ -191,6 +191,10 @@ impl Listener {
             name: plain::message(&in_one_line(&hello.name)),
             ..hello.clone()
         }));
+        if self.compared.is_none() {
+            // It has as long again to send what it is asked for now.
+            self.last_arrival = Instant::now();
+        }
         self.compare_channels(usize::from(hello.channels), tell);
         if let Some(rate) = self
             .rate

@@ -85,7 +85,7 @@ pub struct Listener {
     pub(super) state: ConnectionState,
     /// When what is taken in just now came.
     pub(super) came: Instant,
-    /// When the last sample came, or the port was opened.
+    /// When the last sample came, or the board answered, or the port was opened.
     pub(super) last_arrival: Instant,
     /// Why nothing can be used, as far as it was told.
     pub(super) explained: Vec<Unusable>,

@@ -70,11 +70,19 @@ fn received_until_over(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<
 }
 
 fn of_board(bytes: Vec<u8>) -> Vec<String> {
+    of_board_in_parts(vec![(Duration::ZERO, bytes)])
+}
+
+/// What comes after some time each.
+fn of_board_in_parts(parts: Vec<(Duration, Vec<u8>)>) -> Vec<String> {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     std::thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
-        stream.write_all(&bytes).unwrap();
+        for (after, bytes) in parts {
+            std::thread::sleep(after);
+            stream.write_all(&bytes).unwrap();
+        }
         stream.shutdown(std::net::Shutdown::Write).unwrap();
         // Until the other side has taken it and is gone.
         let _ = std::io::copy(&mut stream, &mut std::io::sink());
@@ -194,6 +202,20 @@ fn a_board_that_cannot_be_used_says_why_once() {
     ]));
     assert_eq!(said.len(), 1, "{said:?}");
     assert!(said[0].starts_with("trouble ") && said[0].contains("gain"));
+}
+
+#[test]
+fn a_board_that_is_long_in_answering_has_time_to_send() {
+    let data = WireMessage::Data(vec![2000; 4]);
+    let said = of_board_in_parts(vec![
+        (
+            PATIENCE + PATIENCE / 10,
+            frames(&[WireMessage::Hello(hello())]),
+        ),
+        (PATIENCE / 10, frames(&[data])),
+    ]);
+    assert!(said.iter().any(|s| s.starts_with("hello ")), "{said:?}");
+    assert!(!said.iter().any(|s| s.starts_with("trouble ")), "{said:?}");
 }
 
 #[test]
