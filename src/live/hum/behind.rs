@@ -13,6 +13,8 @@ use crate::statistics::{chi_squared_bound, median};
 const PERIODS: f64 = 2.0;
 const SAMPLES: f64 = 8.0;
 const STRETCHES: usize = 8;
+/// So many samples a second are enough for the harmonics of mains.
+const ENOUGH_HZ: f64 = 1000.0;
 /// A grid is off by less (Hz), unless it falls apart.
 const OFF: f64 = 0.2;
 /// Of normal numbers: the variance of a median over that of a mean, their deviation over the median of absolute values, and their
@@ -29,19 +31,38 @@ pub(super) fn line_near(
     near: &[f64],
     usual: &[f64],
 ) -> Option<HumLine> {
+    let together = (rate / ENOUGH_HZ).floor().max(1.0) as usize;
+    let (rows, rate) = (thinned(rows, together), rate / together as f64);
     let tried = near
         .iter()
         .flat_map(|hertz| [-OFF, 0.0, OFF].map(|off| hertz + off));
-    let found = tried.filter_map(|hertz| Stretches::of(rows, rate, hertz));
+    let found = tried.filter_map(|hertz| Stretches::of(&rows, rate, hertz));
     // A large line shows at its harmonics too, but as a smaller one.
     let clear = found.filter(|stretches| stretches.is_clear(usual));
     let best = clear.max_by(|a, b| a.size().total_cmp(&b.size()))?;
-    let nearer = Stretches::of(rows, rate, best.hertz + best.faster_by())?;
+    let nearer = Stretches::of(&rows, rate, best.hertz + best.faster_by())?;
+    // Their last mean is of a while before the last sample.
+    let since_s = 0.5 * (together - 1) as f64 / (rate * together as f64);
     Some(HumLine {
         hertz: nearer.hertz,
-        phase: 0.0,
+        phase: TAU * nearer.hertz * since_s,
         waves: nearer.medians(0..nearer.waves.len()),
     })
+}
+
+/// Means of so many samples each, the last of them whole: what is faster takes long to look through, and touches wait for it.
+fn thinned(rows: &HumSamples, together: usize) -> HumSamples {
+    let skipped = rows.len() % together;
+    let means = (0..rows.len() / together).map(|k| {
+        let first = skipped + k * together;
+        let some = || rows.range(first..first + together);
+        let count = together as f64;
+        let channels = 0..rows[first].1.len();
+        let mean = |c: usize| some().map(|row| row.1[c]).sum::<f64>() / count;
+        let at = some().map(|row| row.0).sum::<f64>() / count;
+        (at, channels.map(mean).collect())
+    });
+    means.collect()
 }
 
 /// The waves of one frequency in stretches of samples, one after the other.

@@ -158,7 +158,7 @@ fn begun_behind(rate: f64, size: f64, begins_s: f64, from_s: f64) -> (f64, usize
 
 #[test]
 fn what_begins_to_hum_behind_touches_is_found() {
-    for rate in [200.0, 500.0, 1000.0, 4000.0] {
+    for rate in [200.0, 500.0, 1000.0, 2500.0, 4000.0] {
         for size in [6.0, 40.0] {
             let (worst, lines) = begun_behind(rate, size, 6.0, 9.5);
             assert!(
