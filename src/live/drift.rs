@@ -192,7 +192,7 @@ impl Drift {
             let of_mean = noise.iter().map(|n| n * n / block.samples);
             let variance: Vec<f64> = of_mean.zip(strays).map(|(n, s)| n + s).collect();
             if was_loaded {
-                self.walk.admit(&off, &variance, used, CAUTION);
+                self.walk.inflate(&off, &variance, used, CAUTION);
             }
             let off = (&off[..], f64::INFINITY);
             let bends = self.creep.bends_by(steps::STRETCH_S);

@@ -27,6 +27,8 @@ const SLOWEST: f64 = 5.0;
 /// Seconds of rest that are looked at, the fewest that say anything, and the most samples.
 const LOOKED_S: f64 = 1.0;
 const LEAST_S: f64 = 0.3;
+/// Seconds between two looks behind touches, while there has been no rest as long.
+const BEHIND_S: f64 = 0.25;
 const MOST: usize = 4000;
 /// Lines at once.
 const LINES: usize = 4;
@@ -47,8 +49,9 @@ pub(super) struct Hum {
     rested: HumSamples,
     /// The last samples, be they at rest or not, without the lines.
     recent: HumSamples,
-    /// When lines were last looked for.
+    /// When lines were last looked for at rest, and behind touches.
     looked_s: f64,
+    behind_s: f64,
 }
 
 impl Hum {
@@ -119,9 +122,11 @@ impl Hum {
             return;
         }
         self.looked_s = self.now_s;
-        let (lines, left) = lines(&self.rested);
+        let (lines, mut left) = lines(&self.rested);
         (self.lines, self.usual) = (lines, scatter(&left));
         // The sample that is just coming is the last of these.
+        left.pop_back();
+        self.recent = left;
         let step = self
             .rested
             .iter()
@@ -136,16 +141,22 @@ impl Hum {
         }
     }
 
-    /// Looks for another line where there has been no second of rest for as long.
+    /// Looks for another line where there is no rest to look at.
     fn look_behind(&mut self) {
-        let is_due = self.now_s - self.looked_s >= 2.0 * LOOKED_S && is_long(&self.recent);
-        if !is_due || self.lines.len() >= LINES {
+        let is_due = self.now_s - self.behind_s >= BEHIND_S && is_long(&self.recent);
+        if !is_due || lasted(&self.rested) >= BEHIND_S || self.lines.len() >= LINES {
             return;
         }
-        self.looked_s = self.now_s - LOOKED_S;
+        self.behind_s = self.now_s;
         let rate = rate(&self.recent);
         let near = unknown(&self.lines, rate);
-        (self.lines).extend(behind::line_near(&self.recent, rate, &near, &self.usual));
+        let known: Vec<f64> = self.lines.iter().map(|line| line.hertz).collect();
+        let found = behind::line_near(&self.recent, rate, [&near, &known], &self.usual);
+        if let Some(line) = found {
+            self.lines.push(line);
+            // It is still in these.
+            self.recent.clear();
+        }
     }
 
     /// Takes the lines of some rest (s, counts) for what hums from its last sample on, and off these.

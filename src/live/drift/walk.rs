@@ -262,7 +262,7 @@ impl RestWalk {
     /// possible, it is known less well: of so many times the variance at most. What one correction would leave of it otherwise
     /// is in directions of which the filter was wrongly sure, and would be taken for a touch (adaptive fading: Q. Xia, M. Rao,
     /// Y. Ying and X. Shen, Automatica 30, 1994).
-    pub fn admit(&mut self, off: &[f64], variance: &[f64], used: &[bool], most: f64) {
+    pub fn inflate(&mut self, off: &[f64], variance: &[f64], used: &[bool], most: f64) {
         let Some(expected) = self.innovation(variance, used, &[]) else {
             return;
         };

@@ -17,6 +17,8 @@ const STRETCHES: usize = 8;
 const ENOUGH_HZ: f64 = 1000.0;
 /// A grid is off by less (Hz), unless it falls apart.
 const OFF: f64 = 0.2;
+/// Of what the later half of the stretches has, in the earlier one: less where it is off in frequency by so much.
+const MOST: f64 = 0.6;
 /// Of normal numbers: the variance of a median over that of a mean, their deviation over the median of absolute values, and their
 /// variance over the square of the mean of these.
 const OF_MEDIAN: f64 = PI / 2.0;
@@ -24,15 +26,16 @@ const OF_ABSOLUTE: f64 = 1.4826;
 const OF_NOISE: f64 = PI / 2.0;
 
 /// The largest line near some frequencies (Hz) in samples at a rate (Hz), with its phase at the last one, if there is any that is
-/// clear; without lines samples are usually off by so much (counts, mean of the absolute values).
+/// clear and larger than what is left of known lines; without lines samples are usually off by so much (counts, mean of the
+/// absolute values).
 pub(super) fn line_near(
     rows: &HumSamples,
     rate: f64,
-    near: &[f64],
+    [near, known]: [&[f64]; 2],
     usual: &[f64],
 ) -> Option<HumLine> {
     let together = (rate / ENOUGH_HZ).floor().max(1.0) as usize;
-    let (rows, rate) = (thinned(rows, together), rate / together as f64);
+    let (rows, rate) = (decimated(rows, together), rate / together as f64);
     let tried = near
         .iter()
         .flat_map(|hertz| [-OFF, 0.0, OFF].map(|off| hertz + off));
@@ -40,18 +43,23 @@ pub(super) fn line_near(
     // A large line shows at its harmonics too, but as a smaller one.
     let clear = found.filter(|stretches| stretches.is_clear(usual));
     let best = clear.max_by(|a, b| a.size().total_cmp(&b.size()))?;
+    let left = (known.iter()).filter_map(|&hertz| Stretches::of(&rows, rate, hertz));
+    if left
+        .map(|stretches| stretches.size())
+        .any(|left| left > best.size())
+    {
+        return None;
+    }
     let nearer = Stretches::of(&rows, rate, best.hertz + best.faster_by())?;
     // Their last mean is of a while before the last sample.
     let since_s = 0.5 * (together - 1) as f64 / (rate * together as f64);
-    Some(HumLine {
-        hertz: nearer.hertz,
-        phase: TAU * nearer.hertz * since_s,
-        waves: nearer.medians(0..nearer.waves.len()),
-    })
+    let waves = nearer.medians(0..nearer.sure());
+    let phase = TAU * nearer.hertz * since_s;
+    Some(HumLine::new(nearer.hertz, phase, waves))
 }
 
 /// Means of so many samples each, the last of them whole: what is faster takes long to look through, and touches wait for it.
-fn thinned(rows: &HumSamples, together: usize) -> HumSamples {
+fn decimated(rows: &HumSamples, together: usize) -> HumSamples {
     let skipped = rows.len() % together;
     let means = (0..rows.len() / together).map(|k| {
         let first = skipped + k * together;
@@ -130,14 +138,40 @@ impl Stretches {
             (middle[0].powi(2) + middle[1].powi(2)) / variance.max(f64::MIN_POSITIVE)
         });
         let free = 2.0 * medians.len() as f64;
-        squares.sum::<f64>() > chi_squared_bound(free, CLEAR)
+        squares.sum::<f64>() > chi_squared_bound(free, CLEAR) && self.lasts()
     }
 
-    /// By how much more (Hz) what hums turns from the earlier half of the stretches to the later one, over all channels.
-    fn faster_by(&self) -> f64 {
+    /// How many stretches, from the last one back, are surely of what hums: half of them, where these are enough.
+    fn sure(&self) -> usize {
         let half = self.waves.len() / 2;
-        let [later, earlier] = [0..half, half..2 * half].map(|part| self.medians(part));
-        -turned(&earlier, &later) / TAU / (half as f64 * self.lasts_s)
+        if half < STRETCHES {
+            self.waves.len()
+        } else {
+            half
+        }
+    }
+
+    /// Medians of the earlier half of so many stretches, and of the later one.
+    fn halves(&self, stretches: usize) -> [Vec<[f64; 2]>; 2] {
+        let half = stretches / 2;
+        [half..2 * half, 0..half].map(|part| self.medians(part))
+    }
+
+    /// Whether the earlier half has most of what the later one has: where it has begun in between, medians are of this and that.
+    fn lasts(&self) -> bool {
+        let [earlier, later] = self.halves(self.waves.len());
+        let dot = |a: &[[f64; 2]], b: &[[f64; 2]]| -> f64 {
+            let parts = a.iter().flatten().zip(b.iter().flatten());
+            parts.map(|(a, b)| a * b).sum()
+        };
+        dot(&earlier, &later) > MOST * dot(&later, &later)
+    }
+
+    /// By how much more (Hz) what hums turns from the earlier half of the sure stretches to the later one, over all channels.
+    fn faster_by(&self) -> f64 {
+        let [earlier, later] = self.halves(self.sure());
+        let half_s = (self.sure() / 2) as f64 * self.lasts_s;
+        -turned(&earlier, &later) / TAU / half_s
     }
 }
 

@@ -7,6 +7,9 @@ use std::f64::consts::{PI, TAU};
 pub(super) const CLEAR: f64 = 12.0;
 /// Seconds in which a line follows the signal.
 const FOLLOWS_S: f64 = 0.3;
+/// So far (Hz) from where it was found a line may go at most: one that shows below the frequencies of a hand is not to be drawn
+/// after a tremble.
+const STRAYS: f64 = 0.5;
 /// What is off by more than so many times what is usual at rest is a touch that comes or goes, and moves a line no further.
 const UNUSUAL: f64 = 4.0;
 
@@ -17,6 +20,8 @@ pub(in crate::live) type HumSamples = VecDeque<(f64, Vec<f64>)>;
 #[derive(Clone, Debug)]
 pub(super) struct HumLine {
     pub hertz: f64,
+    /// Its frequency when it was found.
+    found: f64,
     /// At the last sample (rad).
     pub phase: f64,
     /// Of its cosine and its sine in every channel (counts).
@@ -54,6 +59,16 @@ pub(super) fn turned(from: &[[f64; 2]], to: &[[f64; 2]]) -> f64 {
 }
 
 impl HumLine {
+    /// One that has just been found.
+    pub fn new(hertz: f64, phase: f64, waves: Vec<[f64; 2]>) -> Self {
+        Self {
+            hertz,
+            found: hertz,
+            phase,
+            waves,
+        }
+    }
+
     /// The line near a frequency that fits samples best.
     pub fn fitted(rows: &HumSamples, level: &[f64], mut hertz: f64) -> Self {
         let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
@@ -64,11 +79,7 @@ impl HumLine {
             let turned = turned(&a, &b).clamp(-0.9 * PI, 0.9 * PI);
             hertz -= turned / TAU / (0.5 * (last - first));
         }
-        Self {
-            waves: waves(rows.iter(), last, level, hertz),
-            phase: 0.0,
-            hertz,
-        }
+        Self::new(hertz, 0.0, waves(rows.iter(), last, level, hertz))
     }
 
     /// Goes a little way with what a sample is off the level (counts), beside what is usual; and where all channels turn alike,
@@ -86,7 +97,8 @@ impl HumLine {
             (*a, *b) = (*a + by * cos, *b + by * sin);
         }
         if size > 0.0 {
-            self.hertz += turned / size / (4.0 * FOLLOWS_S) / TAU;
+            let hertz = self.hertz + turned / size / (4.0 * FOLLOWS_S) / TAU;
+            self.hertz = hertz.clamp(self.found - STRAYS, self.found + STRAYS);
         }
     }
 

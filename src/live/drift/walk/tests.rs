@@ -127,7 +127,7 @@ fn channels_that_drift_unevenly_are_told_and_stay_so() {
 }
 
 /// What three channels hid is farther off than was thought: how much one correction at rest leaves of it, in all (strain).
-fn left_of_hidden(by: f64, is_admitted: bool) -> f64 {
+fn left_of_hidden(by: f64, is_inflated: bool) -> f64 {
     let mut walk = Simulated {
         hidden: 3,
         from_s: 3.0,
@@ -137,8 +137,8 @@ fn left_of_hidden(by: f64, is_admitted: bool) -> f64 {
     let (variance, used) = ([NOISE * NOISE; N], [true; N]);
     let hid = [by, -by, by, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let before: Vec<f64> = walk.rest(0.0).collect();
-    if is_admitted {
-        walk.admit(&hid, &variance, &used, 16.0);
+    if is_inflated {
+        walk.inflate(&hid, &variance, &used, 16.0);
     }
     let all = (&hid[..], f64::INFINITY);
     walk.correct(all, &variance, &used, &[]).unwrap();
@@ -149,12 +149,12 @@ fn left_of_hidden(by: f64, is_admitted: bool) -> f64 {
 #[test]
 fn what_is_farther_off_than_was_thought_is_believed() {
     let by = 6e-6;
-    let [trusting, admitted] = [false, true].map(|is_admitted| left_of_hidden(by, is_admitted));
+    let [trusting, inflated] = [false, true].map(|is_inflated| left_of_hidden(by, is_inflated));
     assert!(trusting > 3.0 * NOISE, "{trusting}");
-    assert!(admitted < 0.6 * trusting, "{admitted} of {trusting}");
+    assert!(inflated < 0.6 * trusting, "{inflated} of {trusting}");
     // What noise may do changes nothing.
-    let [trusting, admitted] = [false, true].map(|is_admitted| left_of_hidden(1e-6, is_admitted));
-    assert_eq!(trusting, admitted);
+    let [trusting, inflated] = [false, true].map(|is_inflated| left_of_hidden(1e-6, is_inflated));
+    assert_eq!(trusting, inflated);
 }
 
 #[test]
