@@ -17,10 +17,59 @@ use super::{SurfacePoint, TriMesh};
 pub struct SignedDistance {
     mesh: Arc<TriMesh>,
     winding: Winding,
-    /// Pieces along each side of a triangle, and the first of them.
-    splits: Vec<(u32, u32)>,
+    /// How each triangle is split.
+    splits: Vec<Split>,
     /// What is known of each piece: a pure function of the surface, filled as it is asked for.
     pieces: Vec<AtomicU8>,
+}
+
+/// A triangle in rows along its shortest side, and each row in columns: of one that is long and narrow there are no more pieces
+/// than it is long.
+struct Split {
+    /// The corner opposite the shortest side.
+    apex: usize,
+    rows: u32,
+    columns: u32,
+    /// Number of the first piece.
+    first: u32,
+}
+
+impl Split {
+    /// Of a triangle with sides opposite its corners (m), in pieces of some size (m).
+    fn new(opposite: [f64; 3], across: f64, first: u32) -> Self {
+        let shorter = |a: &usize, b: &usize| opposite[*a].total_cmp(&opposite[*b]);
+        let apex = (0..3).min_by(shorter).unwrap_or(0);
+        let count = |length: f64| (length / across).ceil().max(1.0) as u32;
+        Self {
+            apex,
+            rows: count(opposite.into_iter().fold(0.0, f64::max)),
+            columns: count(opposite[apex]),
+            first,
+        }
+    }
+
+    fn pieces(&self) -> u32 {
+        self.rows * self.columns
+    }
+
+    /// Row and column of a point.
+    fn piece(&self, barycentric: [f64; 3]) -> [u32; 2] {
+        let up = barycentric[self.apex];
+        let along = barycentric[(self.apex + 1) % 3] / (1.0 - up).max(f64::MIN_POSITIVE);
+        let within = |share: f64, count: u32| ((share * f64::from(count)) as u32).min(count - 1);
+        [within(up, self.rows), within(along, self.columns)]
+    }
+
+    /// The point at these shares of a row and of a column.
+    fn point(&self, [row, column]: [u32; 2], [up, along]: [f64; 2]) -> [f64; 3] {
+        let up = (f64::from(row) + up) / f64::from(self.rows);
+        let along = (f64::from(column) + along) / f64::from(self.columns) * (1.0 - up);
+        let mut barycentric = [0.0; 3];
+        barycentric[self.apex] = up;
+        barycentric[(self.apex + 1) % 3] = along;
+        barycentric[(self.apex + 2) % 3] = 1.0 - up - along;
+        barycentric
+    }
 }
 
 /// Pieces are about this share of the whole across.
@@ -44,11 +93,13 @@ impl SignedDistance {
         let (lower, upper) = mesh.bounds();
         let across = PIECE * (upper - lower).length();
         let mut first = 0;
-        let splits: Vec<(u32, u32)> = (0..mesh.triangles().len() as u32)
+        let splits: Vec<Split> = (0..mesh.triangles().len() as u32)
             .map(|t| {
-                let n = (mesh.longest_side(t) / across).ceil().max(1.0) as u32;
-                first += n * n;
-                (n, first - n * n)
+                let [a, b, c] = mesh.corners(t);
+                let opposite = [b.distance(c), c.distance(a), a.distance(b)];
+                let split = Split::new(opposite, across, first);
+                first += split.pieces();
+                split
             })
             .collect();
         Self {
@@ -147,18 +198,12 @@ impl SignedDistance {
 
     /// Whether the piece around a point parts inside from outside.
     fn parts(&self, at: SurfacePoint) -> bool {
-        let (n, first) = self.splits[at.triangle as usize];
-        let scaled = at.barycentric.map(|w| w * f64::from(n));
-        let (i, j) = (scaled[1].floor().min(f64::from(n - 1)), scaled[2].floor());
-        let j = j.min(f64::from(n - 1) - i).max(0.0);
-        let down = scaled[1] - i + scaled[2] - j > 1.0 && i + j + 1.0 < f64::from(n);
-        // Rows of a triangle: 2 (n - i) - 1 pieces in row i.
-        let (row, column) = (i as u32, j as u32);
-        let number = first + row * (2 * n - row) + 2 * column + u32::from(down);
-        let known = &self.pieces[number as usize];
+        let split = &self.splits[at.triangle as usize];
+        let piece @ [row, column] = split.piece(at.barycentric);
+        let known = &self.pieces[(split.first + row * split.columns + column) as usize];
         let state = match known.load(Ordering::Relaxed) {
             UNKNOWN => {
-                let state = self.look(at.triangle, n, [i, j], down);
+                let state = self.look(at.triangle, piece);
                 known.store(state, Ordering::Relaxed);
                 state
             }
@@ -167,33 +212,25 @@ impl SignedDistance {
         state == PARTING
     }
 
-    fn look(&self, t: u32, n: u32, [i, j]: [f64; 2], down: bool) -> u8 {
-        /// Points looked at in a piece: its middle, and near its corners. Behind it the middle says enough:
-        /// what has no thickness has none anywhere.
-        const LOOKS: [[f64; 3]; 4] = [
-            [0.34, 0.33, 0.33],
-            [0.9, 0.05, 0.05],
-            [0.05, 0.9, 0.05],
-            [0.05, 0.05, 0.9],
-        ];
+    fn look(&self, triangle: u32, piece: [u32; 2]) -> u8 {
+        /// Points looked at in a piece: its middle, and near its corners and the side nearest to the apex. Behind it the
+        /// middle says enough: what has no thickness has none anywhere.
+        const LOOKS: [[f64; 2]; 4] = [[0.5, 0.5], [0.05, 0.05], [0.05, 0.95], [0.95, 0.5]];
         /// How far outside, in sizes of the piece.
         const OFF: f64 = 1e-4;
-        let normal = self.mesh.facet_normal(t);
-        let off = normal * (OFF * self.mesh.longest_side(t) / f64::from(n));
-        let corners: [[f64; 2]; 3] = if down {
-            [[i + 1.0, j], [i + 1.0, j + 1.0], [i, j + 1.0]]
-        } else {
-            [[i, j], [i + 1.0, j], [i, j + 1.0]]
-        };
-        let [a, b, c] = self.mesh.corners(t);
-        let place = |w: &[f64; 3]| {
-            let sum = |k: usize| (0..3).map(|m| w[m] * corners[m][k]).sum::<f64>() / f64::from(n);
-            a + (b - a) * sum(0) + (c - a) * sum(1)
+        let split = &self.splits[triangle as usize];
+        let longest = self.mesh.longest_side(triangle);
+        let off = self.mesh.facet_normal(triangle) * (OFF * longest / f64::from(split.rows));
+        let place = |share: [f64; 2]| {
+            self.mesh.point(SurfacePoint {
+                triangle,
+                barycentric: split.point(piece, share),
+            })
         };
         let clear = LOOKS
             .iter()
-            .all(|w| self.winding.at(place(w) + off).abs() < PARTS)
-            && (self.winding.at(place(&LOOKS[0]) - off) - 1.0).abs() < PARTS;
+            .all(|share| self.winding.at(place(*share) + off).abs() < PARTS)
+            && (self.winding.at(place(LOOKS[0]) - off) - 1.0).abs() < PARTS;
         if clear { PARTING } else { UNCLEAR }
     }
 }
@@ -205,6 +242,38 @@ mod tests {
 
     use super::super::winding::tests::ball;
     use super::*;
+
+    /// Long ones too, whichever corner is opposite the shortest side.
+    #[test]
+    fn every_point_of_a_triangle_is_in_the_piece_it_is_a_point_of() {
+        for opposite in [
+            [1.0, 1.0, 1.0],
+            [0.1, 3.0, 3.0],
+            [3.0, 0.4, 2.8],
+            [2.0, 2.1, 0.3],
+        ] {
+            let split = Split::new(opposite, 0.25, 7);
+            let mut pieces = std::collections::BTreeSet::new();
+            for row in 0..split.rows {
+                for column in 0..split.columns {
+                    for share in [[0.5, 0.5], [0.01, 0.99], [0.99, 0.01]] {
+                        let point = split.point([row, column], share);
+                        assert!((point.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                        assert!(point.iter().all(|w| (0.0..=1.0).contains(w)), "{point:?}");
+                        assert_eq!(split.piece(point), [row, column]);
+                        pieces.insert(split.piece(point));
+                    }
+                }
+            }
+            assert_eq!(pieces.len(), split.pieces() as usize);
+            let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            for [row, column] in corners.map(|corner| split.piece(corner)) {
+                assert!(row < split.rows && column < split.columns);
+            }
+        }
+        // Twelve rows of one column, not twelve times twelve.
+        assert_eq!(Split::new([0.1, 3.0, 3.0], 0.25, 0).pieces(), 12);
+    }
 
     /// The sign is that of the winding number everywhere but within rounding of the surface.
     fn agrees(mesh: &Arc<TriMesh>) -> usize {
