@@ -120,9 +120,10 @@ impl Misfit {
         });
     }
 
-    /// What a touch as hard as this (N) reads (strain) where it came to, by its estimate then.
+    /// What a touch as hard as this (N) reads (strain) where it came to, by its estimate then; nothing of one that has become so
+    /// much harder that it is another one: beside what is held a newton that is hardly felt may be fifty the next moment.
     pub fn reading(&self, force: f64) -> Option<Vec<f64>> {
-        let found = self.found.as_ref().filter(|f| f.force > 0.0)?;
+        let found = (self.found.as_ref()).filter(|f| f.force > 0.0 && force < HARDER * f.force)?;
         let share = force / found.force;
         let pairs = found.read.iter().zip(&found.left);
         Some(pairs.map(|(read, left)| share * (read - left)).collect())
@@ -142,4 +143,26 @@ pub(super) fn doubt_of(reading: &[f64]) -> Vec<f64> {
 
 fn doubt(strain: f64) -> f64 {
     BLOCKS * (DOUBT * strain).powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_touch_reads_no_more_than_it_may_have_become_harder() {
+        let mut misfit = Misfit::default();
+        let touch = EstimatedTouch {
+            place: DVec3::ZERO,
+            force: 0.5,
+            is_area: false,
+            left: &[0.0, 1e-6],
+            read: &[20e-6, 3e-6],
+        };
+        misfit.came(touch, Vec::new());
+        let lighter = misfit.reading(0.25).expect("the same touch");
+        assert!((lighter[0] - 10e-6).abs() < 1e-12 && (lighter[1] - 1e-6).abs() < 1e-12);
+        assert!(misfit.reading(0.6).is_some());
+        assert_eq!(misfit.reading(30.0), None);
+    }
 }
