@@ -9,6 +9,7 @@ mod feeling;
 mod ground;
 pub mod health;
 mod hum;
+mod jumps;
 mod lately;
 mod news;
 pub mod pipeline;
@@ -18,6 +19,7 @@ pub mod receiver;
 mod release;
 mod standing;
 pub mod tare;
+mod trained;
 mod tremble;
 mod update;
 

@@ -254,8 +254,10 @@ impl Drift {
         // As it came: what is loaded is no other because the estimate wanders, and what that is beside the ways in which the touch
         // may be another one would seem to be seen.
         let hardest = touches.contacts.first();
-        let load = hardest.and_then(|touch| self.misfit.reading(touch.force));
-        self.go_on_to(self.now_s, Some(load.as_deref().unwrap_or(reading)));
+        let as_it_came = hardest.and_then(|touch| self.misfit.reading(touch.force));
+        let read: Vec<f64> = strain.iter().zip(self.rest()).map(|(x, b)| x - b).collect();
+        let load = load_of(as_it_came.as_deref().unwrap_or(reading), &read);
+        self.go_on_to(self.now_s, Some(load));
         let rest: Vec<f64> = self.walk.rest(0.0).collect();
         for (x, rest) in mean.iter_mut().zip(rest.iter().chain(&rest)) {
             *x -= rest;
@@ -315,6 +317,13 @@ impl Drift {
         self.forget();
     }
 
+    /// A channel has jumped, by as much as is known so well (strain²), and its samples are as if it had not.
+    pub fn jumped(&mut self, channel: usize, variance: f64, noise: &[f64], used: &[bool]) {
+        self.walk.covariance[(channel, channel)] += variance;
+        self.forget();
+        self.weigh(noise, used);
+    }
+
     /// Nothing is known of what was gathered.
     fn forget(&mut self) {
         self.waiting.clear();
@@ -359,6 +368,18 @@ impl Drift {
         let hid = if self.creep.loaded { CAUTION } else { 1.0 };
         self.weights[1] = weights(&(after * hid), noise, used);
         self.weighed_for = used.to_vec();
+    }
+}
+
+/// What loads the channels, where a touch is thought to read so (strain): what is read, if that touch leaves more of it than it
+/// explains. Where place and force are hardly told apart, the means of both may be of a touch that reads a thousand times as much.
+fn load_of<'a>(reading: &'a [f64], read: &'a [f64]) -> &'a [f64] {
+    let left = reading.iter().zip(read).map(|(r, x)| (x - r) * (x - r));
+    let all = read.iter().map(|x| x * x);
+    if left.sum::<f64>() < all.sum::<f64>() {
+        reading
+    } else {
+        read
     }
 }
 

@@ -21,8 +21,10 @@ const END: f64 = 4.0;
 pub(super) struct Feeling {
     above: u32,
     below: u32,
-    /// Weighted squares that the touch usually has.
+    /// Weighted squares that the touch usually has, and has now; and those of the least of several by itself.
     usual: f64,
+    now: f64,
+    least: Option<f64>,
     pub touching: bool,
     /// Seconds since touches were found in what is felt.
     strange_s: f64,
@@ -51,9 +53,11 @@ impl Feeling {
     pub fn take(&mut self, [plain, cautious]: [f64; 2], channels: usize) -> Turn {
         let channels = channels as f64;
         // A touch that stands goes on; what is left when most of it has gone, or when no touch reads so, may be what it hid.
-        let gone = !self.touching || self.strange_s >= STRANGE_S || plain < GONE * self.usual;
+        let usual = self.least.map_or(self.usual, |least| least.min(self.usual));
+        let gone = !self.touching || self.strange_s >= STRANGE_S || plain < GONE * usual;
         let squares = if gone { cautious } else { plain };
         self.usual += (plain - self.usual) * if self.touching { USUAL } else { 1.0 };
+        self.now = plain;
         let begins = channels >= FEWEST && squares > chi_squared_bound(channels, BEGIN);
         let ends = channels < FEWEST || squares < chi_squared_bound(channels, END);
         self.above = if begins { self.above + 1 } else { 0 };
@@ -78,9 +82,17 @@ impl Feeling {
         };
     }
 
+    /// Touches explain the sample: several, of which the least would have so many weighted squares alone, or one.
+    pub fn several(&mut self, least: Option<f64>) {
+        if std::mem::replace(&mut self.least, least).is_some() && least.is_none() {
+            // One of them has stayed.
+            self.usual = self.now;
+        }
+    }
+
     /// Nothing touches.
     pub fn end(&mut self) {
-        (self.above, self.below, self.touching) = (0, 0, false);
+        (self.above, self.below, self.touching, self.least) = (0, 0, false, None);
         self.strange_s = 0.0;
     }
 }
@@ -119,5 +131,25 @@ mod tests {
         assert_eq!(ended(&turns([180.0, 12.0], false, 15)), None);
         // Most of it has gone.
         assert_eq!(ended(&turns([70.0, 3.0], true, 10)), Some(5));
+    }
+
+    /// A finger that has stood for long, with little beside another: this one goes, and then the finger too.
+    #[test]
+    fn the_finger_that_stays_is_not_what_the_other_hid() {
+        let mut feeling = Feeling::default();
+        let mut take = |squares: [f64; 2], least: Option<f64>| {
+            feeling.found(true, 0.01);
+            let turn = feeling.take(squares, 10);
+            feeling.several(least);
+            turn
+        };
+        for k in 0..200 {
+            take([5000.0, if k < 10 { 5000.0 } else { 400.0 }], Some(90.0));
+        }
+        for _ in 0..100 {
+            assert!(take([90.0, 6.0], None) == Turn::Same);
+        }
+        let ends = (0..10).position(|_| take([30.0, 2.0], None) == Turn::Ends);
+        assert_eq!(ends, Some(5));
     }
 }

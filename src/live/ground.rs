@@ -2,6 +2,7 @@
 
 use super::drift::Drift;
 use super::hum::Hum;
+use super::jumps::Jump;
 use super::tare::Rest;
 use super::tremble::Tremble;
 use super::update::PipelineSettings;
@@ -115,6 +116,17 @@ impl KnownRest {
             None => raw.clone(),
         };
         Some([raw, strain])
+    }
+
+    /// A channel has jumped: its rest is there from now on.
+    pub fn jumped(&mut self, jump: &Jump, settings: &PipelineSettings, used: &[bool]) {
+        if let Some(rest) = &mut self.rest {
+            rest.level[jump.channel] += jump.by * settings.chain.counts_per_strain();
+        }
+        if let Some(drift) = &mut self.drift {
+            drift.jumped(jump.channel, jump.variance, &self.noise, used);
+        }
+        self.tremble.forget();
     }
 
     /// Weighted squares of a reading without a touch, and these with caution: see [`Drift::squares`].

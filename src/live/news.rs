@@ -2,6 +2,7 @@
 
 use super::blind::LIGHT_N;
 use crate::uncertainty::BLIND;
+use crate::units;
 
 /// What a pipeline has to say of its rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +13,8 @@ pub enum RestNews {
     Released,
     /// On this share of the surface a light touch is not felt.
     Blind(f64),
+    /// A gauge (from 0) has jumped by so much (strain).
+    Jumped(usize, f64),
 }
 
 impl RestNews {
@@ -29,6 +32,13 @@ impl RestNews {
                 return format!(
                     "a touch of {LIGHT_N} N is not felt on {:.0} % of the surface: it moves no gauge that is trusted by {BLIND} times its noise there. See which gauges are left out, and what makes the others noisy",
                     100.0 * share
+                );
+            }
+            Self::Jumped(gauge, by) => {
+                return format!(
+                    "gauge {} has jumped by {:.0} microstrain and goes on from there: see to its wires and its glue",
+                    gauge + 1,
+                    units::microstrain(by)
                 );
             }
         };

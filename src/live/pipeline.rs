@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::blind::Blind;
 use super::checking::Checking;
 use super::counting::Counting;
@@ -11,12 +9,13 @@ use super::feeling::{Feeling, Turn};
 use super::ground::{KnownRest, Under};
 use super::health::Health;
 use super::hum::Hum;
+use super::jumps::Jumps;
 use super::news::RestNews;
 use super::receiver::Sample;
 use super::release::Release;
 use super::tare::{Rest, Taring};
-use super::update::{GaugeModel, Guess, LiveUpdate, PipelineSettings};
-use crate::dataset::SignalMatrix;
+use super::trained::Trained;
+use super::update::{GaugeModel, LiveUpdate, PipelineSettings};
 use crate::inference::{Contact, Matching, SeveralTouches, TrainedLive};
 use crate::learning::TouchEstimator;
 use crate::units;
@@ -42,16 +41,13 @@ pub struct Pipeline {
     /// Thresholds and constants.
     pub settings: PipelineSettings,
     matching: Matching,
-    trained: [Option<Arc<TrainedLive>>; 2],
-    /// What the trained ones were trained with: with other channels they say nothing.
-    trained_for: Vec<bool>,
-    /// What was learned from presses alone: by all channels.
-    learned: Option<Arc<TouchEstimator>>,
+    trained: Trained,
     taring: Option<Taring>,
     ground: KnownRest,
     /// What the project knows all to have drifted by together (strain).
     known_drift: f64,
     checking: Checking,
+    jumps: Jumps,
     hello: Option<Hello>,
     last_time: Option<u64>,
     /// Samples a second, as measured.
@@ -84,11 +80,10 @@ impl Pipeline {
             matching,
             ground: KnownRest::new(noise),
             settings,
-            trained: [None, None],
-            trained_for: Vec::new(),
-            learned: None,
+            trained: Trained::default(),
             taring: None,
             checking: Checking::new(gauges),
+            jumps: Jumps::default(),
             hello: None,
             last_time: None,
             rate: RATE,
@@ -134,12 +129,12 @@ impl Pipeline {
 
     /// The trained estimators (normalized, raw) and which gauges they were trained with.
     pub fn set_trained(&mut self, trained: [Option<Arc<TrainedLive>>; 2], used: Vec<bool>) {
-        (self.trained, self.trained_for) = (trained, used);
+        (self.trained.of_model, self.trained.of_channels) = (trained, used);
     }
 
     /// An estimator that was learned from presses alone, or none.
     pub fn set_learned(&mut self, learned: Option<Arc<TouchEstimator>>) {
-        self.learned = learned;
+        self.trained.of_presses = learned;
     }
 
     /// Forgets everything but the rest and which gauges were found dead, so that what follows depends on what
@@ -181,6 +176,7 @@ impl Pipeline {
     fn take_rest(&mut self, rest: Rest, hum: Hum) {
         self.ground.take(rest, hum, &self.settings, self.rate);
         (self.taring, self.proved) = (None, false);
+        self.jumps = Jumps::default();
         self.blind.forget();
         self.allow_for_drift();
     }
@@ -275,12 +271,13 @@ impl Pipeline {
         let came = counts.clone();
         let strains = (self.ground).strain(step_s, &mut counts, &self.settings, at_rest);
         self.watch(&came, Some(&counts));
-        let Some([raw, strain]) = strains else {
+        let Some([mut raw, mut strain]) = strains else {
             return nothing;
         };
         self.matching.used = self.checking.used();
         let (blind, is_news) = self.blind.look(&self.matching, &self.ground.noise);
         self.news = is_news.then_some(RestNews::Blind(blind));
+        self.take_jumps_off(step_s, &mut raw, &mut strain);
         self.feel(&strain);
         let (touches, explained) = if self.feeling.touching {
             self.find(sample.time_us, &strain)
@@ -291,6 +288,9 @@ impl Pipeline {
         // What is hardly felt is not strange because nothing was found in it.
         let passed_s = if self.feeling.clearly() { step_s } else { 0.0 };
         self.feeling.found(is_found, passed_s);
+        if let (Some(touches), true) = (&touches, explained) {
+            self.tell_least_of_several(touches);
+        }
         let may_be_off = self.feeling.touching && !self.proved;
         let stands = may_be_off && self.release.stands(&mut self.matching, &strain, step_s);
         if stands || self.release.is_sure(self.proved) {
@@ -300,7 +300,7 @@ impl Pipeline {
         }
         let contact = (touches.as_ref()).and_then(|t| t.contacts.first().copied());
         let guesses = if contact.is_some() {
-            self.guess(&strain)
+            self.trained.guess(&strain, &self.matching.used)
         } else {
             [None; 3]
         };
@@ -333,6 +333,28 @@ impl Pipeline {
         let highest = known.then(|| f64::from(self.settings.chain.highest_count()));
         let rest = self.ground.rest.as_ref();
         (self.checking).watch((counts, steady), rest, self.rate, highest);
+    }
+
+    /// Where several touches explain a sample, any of them may be what stays.
+    fn tell_least_of_several(&mut self, touches: &SeveralTouches) {
+        let each = self.matching.readings_of(touches).into_iter();
+        let used = &self.matching.used;
+        let squares = each.map(|reading| self.ground.squares(&reading, used)[0]);
+        let several = touches.contacts.len() > 1;
+        let least = several.then(|| squares.fold(f64::INFINITY, f64::min));
+        self.feeling.several(least);
+    }
+
+    /// Takes off a sample (strain since the tare, and since the rest) what a gauge has jumped by.
+    fn take_jumps_off(&mut self, step_s: f64, raw: &mut [f64], strain: &mut [f64]) {
+        let (matching, noise) = (&self.matching, &self.ground.noise);
+        let now = (self.feeling.touching, step_s);
+        let Some(jump) = self.jumps.take_off(matching, raw, noise, now) else {
+            return;
+        };
+        strain[jump.channel] -= jump.by;
+        (self.ground).jumped(&jump, &self.settings, &self.matching.used);
+        self.news = jump.news().or(self.news);
     }
 
     fn go_on_taring(&mut self, time_us: u64, counts: &[f64]) {
@@ -474,24 +496,5 @@ impl Pipeline {
         }
         self.search = Some((strain.to_vec(), found));
         Some(found)
-    }
-
-    fn guess(&self, strain: &[f64]) -> [Option<Guess>; 3] {
-        let guess = |(place, force): ([f64; 3], f64)| Guess {
-            position: units::from_mm(DVec3::from_array(place)),
-            force,
-        };
-        let used = &self.matching.used;
-        let trained = |k: usize| {
-            let trained = self.trained[k].as_ref();
-            trained.filter(|_| self.trained_for == *used)
-        };
-        let learned = self.learned.as_ref().filter(|_| used.iter().all(|u| *u));
-        let answer = learned.and_then(|l| l.find(&SignalMatrix::new(1, strain.to_vec())).pop());
-        [
-            trained(0).map(|t| guess(t.find(strain))),
-            trained(1).map(|t| guess(t.find(strain))),
-            answer.map(|a| guess((a.place_mm, a.force_n.unwrap_or(0.0)))),
-        ]
     }
 }

@@ -12,7 +12,7 @@ const OFF: f64 = 8.0;
 /// Times that others have come and gone and left it as it was.
 const RETURNS: u32 = 2;
 /// A pull leaves only so many weighted squares more than a touch does.
-const NO_WORSE: f64 = 10.0;
+const NO_WORSE: f64 = 0.0;
 
 /// What is read while others come and go.
 #[derive(Clone, Debug, Default)]

@@ -33,6 +33,8 @@ pub struct World {
     trembles: f64,
     /// Share of a load that is read in addition after a long while.
     creep: f64,
+    /// Which gauge jumps when a press has gone, and by how much.
+    jumps: (usize, f64),
 }
 
 pub const CALM: World = World {
@@ -48,7 +50,15 @@ pub const CALM: World = World {
     wanders_hz: 0.0,
     trembles: 0.0,
     creep: 0.0,
+    jumps: (0, 0.0),
 };
+
+impl World {
+    pub fn that_jumps(gauge: usize, by: f64) -> Self {
+        let jumps = (gauge, by);
+        Self { jumps, ..CALM }
+    }
+}
 
 /// From, for how long (s), rising within (s).
 pub struct Press {
@@ -77,6 +87,8 @@ pub fn run(
 ) {
     /// Seconds in which creep comes.
     const CREEPS_S: f64 = 6.0;
+    /// When a gauge jumps (s).
+    const JUMPS_S: f64 = 10.75;
     let lab = lab();
     let gauges = lab.sensing.gauges.len();
     let chain = Chain {
@@ -128,7 +140,10 @@ pub fn run(
                 } else {
                     world.hum * hum
                 };
+                let (gauge, by) = world.jumps;
+                let jumped = c == gauge && now > JUMPS_S;
                 let strain = load(c)
+                    + if jumped { by } else { 0.0 }
                     + crept[c]
                     + walked[c]
                     + world.drift * uneven[c] * now

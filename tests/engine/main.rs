@@ -32,6 +32,7 @@ mod groups;
 mod halved;
 mod inference;
 mod judge;
+mod jumps;
 mod learning;
 mod libsvm;
 mod making;

@@ -1,6 +1,6 @@
 //! What several touches read together, and how far that may be off.
 
-use super::{RADII, SeveralTouches, TouchKind};
+use super::{RADII, SeveralTouches, Spot, TouchKind};
 use crate::inference::matching::Matching;
 
 impl Matching {
@@ -8,12 +8,23 @@ impl Matching {
     #[must_use]
     pub fn reading_of_all(&self, touches: &SeveralTouches) -> Vec<f64> {
         let mut sum = vec![0.0; self.map.channels()];
-        for spot in self.spots_of(touches) {
-            for (s, g) in sum.iter_mut().zip(self.felt(&spot).reading) {
-                *s += spot.force * g;
+        for reading in self.readings_of(touches) {
+            for (sum, x) in sum.iter_mut().zip(reading) {
+                *sum += x;
             }
         }
         sum
+    }
+
+    /// What every channel reads of each of some touches (strain).
+    #[must_use]
+    pub fn readings_of(&self, touches: &SeveralTouches) -> Vec<Vec<f64>> {
+        let spots = self.spots_of(touches).into_iter();
+        let reading = |spot: Spot| -> Vec<f64> {
+            let felt = self.felt(&spot).reading.into_iter();
+            felt.map(|g| spot.force * g).collect()
+        };
+        spots.map(reading).collect()
     }
 
     /// As [`Self::leeway`], of all of them together.
