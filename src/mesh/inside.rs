@@ -18,14 +18,14 @@ pub struct SignedDistance {
     mesh: Arc<TriMesh>,
     winding: Winding,
     /// How each triangle is split.
-    splits: Vec<Split>,
+    splits: Vec<FacetSplit>,
     /// What is known of each piece: a pure function of the surface, filled as it is asked for.
     pieces: Vec<AtomicU8>,
 }
 
 /// A triangle in rows along its shortest side, and each row in columns: of one that is long and narrow there are no more pieces
 /// than it is long.
-struct Split {
+struct FacetSplit {
     /// The corner opposite the shortest side.
     apex: usize,
     rows: u32,
@@ -34,7 +34,7 @@ struct Split {
     first: u32,
 }
 
-impl Split {
+impl FacetSplit {
     /// Of a triangle with sides opposite its corners (m), in pieces of some size (m).
     fn new(opposite: [f64; 3], across: f64, first: u32) -> Self {
         let shorter = |a: &usize, b: &usize| opposite[*a].total_cmp(&opposite[*b]);
@@ -93,11 +93,11 @@ impl SignedDistance {
         let (lower, upper) = mesh.bounds();
         let across = PIECE * (upper - lower).length();
         let mut first = 0;
-        let splits: Vec<Split> = (0..mesh.triangles().len() as u32)
+        let splits: Vec<FacetSplit> = (0..mesh.triangles().len() as u32)
             .map(|t| {
                 let [a, b, c] = mesh.corners(t);
                 let opposite = [b.distance(c), c.distance(a), a.distance(b)];
-                let split = Split::new(opposite, across, first);
+                let split = FacetSplit::new(opposite, across, first);
                 first += split.pieces();
                 split
             })
@@ -252,7 +252,7 @@ mod tests {
             [3.0, 0.4, 2.8],
             [2.0, 2.1, 0.3],
         ] {
-            let split = Split::new(opposite, 0.25, 7);
+            let split = FacetSplit::new(opposite, 0.25, 7);
             let mut pieces = std::collections::BTreeSet::new();
             for row in 0..split.rows {
                 for column in 0..split.columns {
@@ -272,7 +272,7 @@ mod tests {
             }
         }
         // Twelve rows of one column, not twelve times twelve.
-        assert_eq!(Split::new([0.1, 3.0, 3.0], 0.25, 0).pieces(), 12);
+        assert_eq!(FacetSplit::new([0.1, 3.0, 3.0], 0.25, 0).pieces(), 12);
     }
 
     /// The sign is that of the winding number everywhere but within rounding of the surface.

@@ -160,6 +160,13 @@ fn presses_by_hand_show_how_gauges_are_glued() {
         why.contains("takes 4 presses") && !at("few.hapdef.toml").exists(),
         "{why}"
     );
+    // The points of another day.
+    script(&at("wrong.csv"), &places(14, 0.5), 10.0);
+    let why = calibrate("wrong.csv", "wrong.hapdef.toml", &[]).unwrap_err();
+    assert!(
+        why.contains("of other places") && !at("wrong.hapdef.toml").exists(),
+        "{why}"
+    );
 }
 
 /// A limb that was printed thicker, of softer nylon or on softer feet than its project says.
