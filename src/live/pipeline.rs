@@ -129,12 +129,12 @@ impl Pipeline {
 
     /// The trained estimators (normalized, raw) and which gauges they were trained with.
     pub fn set_trained(&mut self, trained: [Option<Arc<TrainedLive>>; 2], used: Vec<bool>) {
-        (self.trained.of_model, self.trained.of_channels) = (trained, used);
+        (self.trained.model, self.trained.channels) = (trained, used);
     }
 
     /// An estimator that was learned from presses alone, or none.
     pub fn set_learned(&mut self, learned: Option<Arc<TouchEstimator>>) {
-        self.trained.of_presses = learned;
+        self.trained.presses = learned;
     }
 
     /// Forgets everything but the rest and which gauges were found dead, so that what follows depends on what

@@ -14,11 +14,11 @@ use crate::units;
 #[derive(Default)]
 pub(super) struct Trained {
     /// Normalized and raw.
-    pub of_model: [Option<Arc<TrainedLive>>; 2],
+    pub model: [Option<Arc<TrainedLive>>; 2],
     /// The channels that these were trained with: with others they say nothing.
-    pub of_channels: Vec<bool>,
+    pub channels: Vec<bool>,
     /// What was learned from presses alone: by all channels.
-    pub of_presses: Option<Arc<TouchEstimator>>,
+    pub presses: Option<Arc<TouchEstimator>>,
 }
 
 impl Trained {
@@ -29,10 +29,10 @@ impl Trained {
             force,
         };
         let of_model = |k: usize| {
-            let trained = self.of_model[k].as_ref();
-            trained.filter(|_| self.of_channels == used)
+            let trained = self.model[k].as_ref();
+            trained.filter(|_| self.channels == used)
         };
-        let of_presses = (self.of_presses.as_ref()).filter(|_| used.iter().all(|u| *u));
+        let of_presses = (self.presses.as_ref()).filter(|_| used.iter().all(|u| *u));
         let answer = of_presses.and_then(|l| l.find(&SignalMatrix::new(1, strain.to_vec())).pop());
         [
             of_model(0).map(|t| guess(t.find(strain))),
