@@ -27,6 +27,8 @@ const OFF: f64 = 1.0 / 3.0;
 const STEEPEST_S: f64 = 0.5e-3;
 /// Seconds after a jump in which nobody is told of another.
 const TOLD_S: f64 = 10.0;
+/// Seconds after a jump within which a channel shows that it has failed.
+const FAILS_S: f64 = 1.0;
 
 /// A channel that has jumped.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +55,8 @@ pub(super) struct Jumps {
     samples: VecDeque<Vec<f64>>,
     /// How many samples each channel has been trusted for: one that was stuck comes back to where it belongs.
     trusted: Vec<usize>,
-    /// Seconds since the last jump.
+    /// The last jump, and seconds since then.
+    last: Option<Jump>,
     since_s: Option<f64>,
 }
 
@@ -70,6 +73,10 @@ impl Jumps {
         self.since_s = self.since_s.map(|since| since + step_s);
         if step_s <= 0.0 {
             self.samples.clear();
+        }
+        if let Some(back) = self.failed(&matching.used) {
+            sample[back.channel] -= back.by;
+            return Some(back);
         }
         self.trusted.resize(sample.len(), 0);
         for (trusted, used) in self.trusted.iter_mut().zip(&matching.used) {
@@ -95,11 +102,26 @@ impl Jumps {
             later[channel] -= by;
         }
         sample[channel] -= by;
-        Some(Jump {
+        self.last = Some(Jump {
             channel,
             by,
             variance: of_change(noise[channel]),
             is_news: self.since_s.replace(0.0).is_none_or(|s| s > TOLD_S),
+        });
+        self.last
+    }
+
+    /// The way back of a jump after which the channel has turned out to be stuck, noisy or at an end of its range: its rest is
+    /// where it was, should it recover.
+    fn failed(&mut self, used: &[bool]) -> Option<Jump> {
+        let lately = self.since_s.is_some_and(|since| since < FAILS_S);
+        let jump = self.last.filter(|jump| lately && !used[jump.channel])?;
+        self.last = None;
+        self.samples.clear();
+        Some(Jump {
+            by: -jump.by,
+            is_news: false,
+            ..jump
         })
     }
 
@@ -268,6 +290,18 @@ mod tests {
         let stuck = |k: usize| one_channel(1, if k < 40 { 30e-6 } else { 0.0 });
         assert_eq!(jumps_where(100, stuck, |k| k >= 40), []);
         assert_eq!(jumps_where(100, stuck, |_| true).len(), 1);
+    }
+
+    /// Under a touch it stays at a value that it cannot leave, and is found to; afterwards it reads what it should.
+    #[test]
+    fn a_gauge_that_jumps_and_fails_has_its_rest_where_it_was() {
+        let read = |k: usize| one_channel(1, if (40..80).contains(&k) { 30e-6 } else { 0.0 });
+        let found = jumps_where(120, read, |k| !(60..80).contains(&k));
+        let [(at, jump), (back_at, back)] = found[..] else {
+            panic!("{found:?}");
+        };
+        assert_eq!([at, back_at], [42, 60]);
+        assert!(jump.by + back.by == 0.0 && back.channel == 1 && !back.is_news);
     }
 
     #[test]
