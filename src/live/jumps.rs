@@ -1,7 +1,7 @@
 //! Gauges that jump from one sample to the next and stay there: a wire was pulled, glue has let go a little. They go on measuring
 //! from another zero, which is their rest from then on.
 //!
-//! What has changed is held against any touch that comes or goes (as A. S. Willsky and H. L. Jones, IEEE Trans. Automatic
+//! What has changed is held against any touch that comes (as A. S. Willsky and H. L. Jones, IEEE Trans. Automatic
 //! Control 21, 108, 1976, hold it against no change): one channel far beyond its noise, and all others not at all, is no touch
 //! where the map says that those would feel it too.
 
@@ -86,15 +86,15 @@ impl Jumps {
         if self.samples.len() > 2 * BESIDE {
             self.samples.pop_front();
         }
-        if self.samples.len() < 2 * BESIDE {
+        // Under a touch nobody can tell another zero from glue that has let go, which reads less of it.
+        if touching || self.samples.len() < 2 * BESIDE {
             return None;
         }
         let change: Vec<f64> = (0..sample.len()).map(|c| self.change(c)).collect();
         let channel = self.alone(&change, noise, &matching.used)?;
         let by = change[channel];
-        // None comes or goes within less.
-        let may_be_touch =
-            step_s > STEEPEST_S && is_touch(matching, noise, touching, (channel, by));
+        // None comes within less.
+        let may_be_touch = step_s > STEEPEST_S && is_touch(matching, noise, (channel, by));
         if may_be_touch {
             return None;
         }
@@ -126,7 +126,7 @@ impl Jumps {
     }
 
     /// By how much a channel has changed between the two samples in the middle (strain), beside what it goes on by: a press
-    /// that comes or trembles meanwhile.
+    /// that comes slowly.
     fn change(&self, channel: usize) -> f64 {
         let [before, after] = [0, BESIDE].map(|from| self.line(from, channel));
         after.0 - before.0 - BESIDE as f64 * f64::midpoint(before.1, after.1)
@@ -176,14 +176,8 @@ fn of_change(noise: f64) -> f64 {
     noise * noise * (2.0 / 3.0 + 9.0 / 4.0)
 }
 
-/// Whether any touch that a limb bears may change a channel by so much (strain), and the others by no more than their noise: one
-/// that comes or, where something touches, goes.
-fn is_touch(
-    matching: &Matching,
-    noise: &[f64],
-    touching: bool,
-    (channel, by): (usize, f64),
-) -> bool {
+/// Whether any touch that a limb bears may change a channel by so much (strain), and the others by no more than their noise.
+fn is_touch(matching: &Matching, noise: &[f64], (channel, by): (usize, f64)) -> bool {
     let count = matching.used.iter().filter(|used| **used).count() as f64 - 1.0;
     let unseen = chi_squared_bound(count, UNSEEN);
     let places = matching.map.values().chunks_exact(noise.len());
@@ -191,8 +185,7 @@ fn is_touch(
     let mut touches = places.map(|gains| (gains, by / gains[channel]));
     touches.any(|(gains, force)| {
         let change: Vec<f64> = gains.iter().map(|gain| OFF * force * gain).collect();
-        let least = if touching { -matching.most_force } else { 0.0 };
-        (least..=matching.most_force).contains(&force)
+        (0.0..=matching.most_force).contains(&force)
             && others(&change, noise, &matching.used, channel) < unseen
     })
 }
@@ -265,24 +258,16 @@ mod tests {
         assert!(up.is_news && !down.is_news);
     }
 
-    /// While a press comes.
     #[test]
-    fn a_gauge_that_jumps_under_a_press_is_told_from_it() {
+    fn under_a_press_nobody_can_tell() {
         let [map, _] = maps();
         let reading = &map.values()[..CHANNELS];
-        let press = |k: usize| 1.0 - (k as f64 / 50.0).cos();
         let found = jumps(100, |k| {
             let jumped = one_channel(2, if k < 40 { 0.0 } else { -30e-6 });
             let pairs = reading.iter().zip(jumped);
-            pairs
-                .map(|(g, jumped)| 4.0 * press(k) * g + jumped)
-                .collect()
+            pairs.map(|(g, jumped)| 4.0 * g + jumped).collect()
         });
-        let [(at, jump)] = found[..] else {
-            panic!("{found:?}");
-        };
-        assert_eq!((at, jump.channel), (42, 2));
-        assert!((jump.by + 30e-6).abs() < 6.0 * NOISE, "{jump:?}");
+        assert_eq!(found, []);
     }
 
     #[test]
