@@ -277,7 +277,7 @@ mod tests {
         assert_eq!(jumps_where(100, stuck, |_| true).len(), 1);
     }
 
-    /// Under a touch it stays at a value that it cannot leave, and is found to; afterwards it reads what it should.
+    /// It stays at a value that it cannot leave, and is found to; afterwards it reads what it should.
     #[test]
     fn a_gauge_that_jumps_and_fails_has_its_rest_where_it_was() {
         let read = |k: usize| one_channel(1, if (40..80).contains(&k) { 30e-6 } else { 0.0 });

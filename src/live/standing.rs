@@ -11,8 +11,6 @@ const LEVEL_S: f64 = 0.3;
 const OFF: f64 = 8.0;
 /// Times that others have come and gone and left it as it was.
 const RETURNS: u32 = 2;
-/// A pull leaves only so many weighted squares more than a touch does.
-const NO_WORSE: f64 = 0.0;
 
 /// What is read while others come and go.
 #[derive(Clone, Debug, Default)]
@@ -30,7 +28,7 @@ pub(super) struct StandingTouch {
 
 impl StandingTouch {
     /// Takes in a reading (strain) some seconds after the one before. Whether the touch that stands is rather a rest that is
-    /// off: others have come and gone and left it just as it was, and one that lets go would read the same.
+    /// off: others have come and gone and left it just as it was, and one that lets go explains it better.
     pub fn is_rather_the_rest(
         &mut self,
         matching: &mut Matching,
@@ -78,11 +76,11 @@ fn is_off(matching: &Matching, strain: &[f64], from: &[f64]) -> bool {
     squares.iter().sum::<f64>() > chi_squared_bound(squares.len() as f64, OFF)
 }
 
-/// Whether something that lets go would read about as well.
+/// Whether something that lets go explains it better than a touch does.
 fn reads_like_a_pull(matching: &mut Matching, strain: &[f64]) -> bool {
     let touch = matching.find(strain);
     let pull = pull::find(matching, strain);
-    pull::explains(&pull) && pull.unexplained < touch.unexplained + NO_WORSE
+    pull::explains(&pull) && pull.unexplained < touch.unexplained
 }
 
 #[cfg(test)]
