@@ -28,7 +28,7 @@ use crate::link::{
     Address, BAUD, ConnectionState, FoxgloveServer, Listener, ListenerCommand, McapLog, Pace,
     Recorder, RecordingExtent, SampleTable, SessionEvent,
 };
-use crate::live::{LiveUpdate, Pipeline, Sample, ShownEstimator};
+use crate::live::{Health, LiveUpdate, Pipeline, Sample, ShownEstimator};
 use crate::plain;
 use crate::session::{train, training_touches};
 use crate::wire::Hello;
@@ -351,9 +351,13 @@ impl Output {
                 let told = self.log.as_mut().map(|log| log.event(event));
                 told.transpose().map_err(anyhow::Error::msg)?;
             }
-            SessionEvent::Sample { sample, update, .. } => {
+            SessionEvent::Sample {
+                sample,
+                update,
+                pipeline,
+            } => {
                 self.row(sample, update)?;
-                self.line(update)?;
+                self.line(update, pipeline.health())?;
             }
             // What waits is written as soon as nothing more is there.
             SessionEvent::Turn { .. } => {
@@ -416,7 +420,7 @@ impl Output {
         Ok(())
     }
 
-    fn line(&mut self, update: &LiveUpdate) -> anyhow::Result<()> {
+    fn line(&mut self, update: &LiveUpdate, health: &[Health]) -> anyhow::Result<()> {
         if self
             .last_us
             .is_some_and(|last| update.time_us.abs_diff(last) < self.period_us)
@@ -432,8 +436,8 @@ impl Output {
             Some(TouchFile {
                 estimator: Learned::Regression(regression),
                 ..
-            }) => line::learned(update, regression),
-            _ => line::of(update, self.estimator),
+            }) => line::learned(update, health, regression),
+            _ => line::of(update, health, self.estimator),
         };
         if let Some((listener, clients)) = &mut self.served {
             while let Ok((client, _)) = listener.accept() {

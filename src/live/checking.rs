@@ -1,6 +1,8 @@
 //! Whether every gauge does what it should: by itself, and as the others say of a touch.
 
 use super::health::{ExpectedSignal, Health, Watcher};
+use super::left_out::LeftOut;
+use super::news::LiveNews;
 use super::tare::Rest;
 use crate::inference::Matching;
 use crate::statistics::median;
@@ -34,6 +36,7 @@ pub(super) struct Checking {
     pub health: Vec<Health>,
     last_look: u64,
     since: TouchMean,
+    left_out: LeftOut,
     /// Noise of most channels (counts), asked for anew after so many samples.
     usual: Option<f64>,
     until: u32,
@@ -78,15 +81,19 @@ impl Checking {
             health: vec![Health::Good; gauges],
             last_look: 0,
             since: TouchMean::default(),
+            left_out: LeftOut::default(),
             usual: None,
             until: 0,
         }
     }
 
-    /// Forgets all but which gauges were found dead.
+    /// Forgets all but which gauges were found dead, and what has been told.
     pub fn begin_anew(&mut self) {
         let dead: Vec<usize> = self.dead().collect();
-        *self = Self::new(self.health.len());
+        *self = Self {
+            left_out: std::mem::take(&mut self.left_out),
+            ..Self::new(self.health.len())
+        };
         for k in dead {
             self.mark_dead(k);
         }
@@ -140,6 +147,11 @@ impl Checking {
             watcher.push(count, hum, &expected);
             self.health[k] = watcher.health(&expected);
         }
+    }
+
+    /// What there is to say of gauges, some seconds after the last sample.
+    pub fn news(&mut self, step_s: f64) -> impl Iterator<Item = LiveNews> + '_ {
+        self.left_out.news(&self.health, step_s)
     }
 
     /// The touch is over.

@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use super::news::RestNews;
+use super::news::LiveNews;
 use crate::inference::Matching;
 use crate::statistics::chi_squared_bound;
 
@@ -43,8 +43,8 @@ pub(super) struct Jump {
 
 impl Jump {
     /// What there is to say of it.
-    pub fn news(&self) -> Option<RestNews> {
-        (self.is_news).then_some(RestNews::Jumped(self.channel, self.by))
+    pub fn news(&self) -> Option<LiveNews> {
+        (self.is_news).then_some(LiveNews::Jumped(self.channel, self.by))
     }
 }
 

@@ -1,12 +1,13 @@
-//! What comes to pass with the rest, for whoever looks on.
+//! What comes to pass with the rest and the gauges, for whoever looks on.
 
 use super::blind::LIGHT_N;
+use super::health::Health;
 use crate::uncertainty::BLIND;
 use crate::units;
 
-/// What a pipeline has to say of its rest.
+/// What a pipeline has to say beside what touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RestNews {
+pub enum LiveNews {
     /// Something moves while the rest is taken.
     Waiting,
     /// The rest was taken under a touch that has let go.
@@ -15,9 +16,11 @@ pub enum RestNews {
     Blind(f64),
     /// A gauge (from 0) has jumped by so much (strain).
     Jumped(usize, f64),
+    /// A gauge (from 0) is left out for what ails it, or is trusted again.
+    Gauge(usize, Health),
 }
 
-impl RestNews {
+impl LiveNews {
     /// For people, with what to do.
     #[must_use]
     pub fn in_words(self) -> String {
@@ -41,7 +44,24 @@ impl RestNews {
                     units::microstrain(by)
                 );
             }
+            Self::Gauge(gauge, health) => return of_gauge(gauge + 1, health),
         };
         words.to_owned()
     }
+}
+
+/// How a gauge (from 1) is, with what to do.
+fn of_gauge(gauge: usize, health: Health) -> String {
+    let ails = match health {
+        Health::Good => return format!("gauge {gauge} is trusted again"),
+        Health::OffScale => {
+            "reads the end of the converter's range: see to its bridge and its wires, or touch less hard"
+        }
+        Health::Stuck => "does not change at all: see to its wires and its amplifier",
+        Health::Noisy => {
+            "is far noisier than the others: see to its wires, and what they run beside"
+        }
+        Health::Dead => "feels no touch that it should feel: see to its glue and its wires",
+    };
+    format!("gauge {gauge} is left out. It {ails}")
 }

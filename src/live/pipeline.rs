@@ -10,7 +10,7 @@ use super::ground::{KnownRest, Under};
 use super::health::Health;
 use super::hum::Hum;
 use super::jumps::Jumps;
-use super::news::RestNews;
+use super::news::LiveNews;
 use super::receiver::Sample;
 use super::release::Release;
 use super::tare::{Rest, Taring};
@@ -61,7 +61,7 @@ pub struct Pipeline {
     release: Release,
     /// Whether a touch has come and gone since the tare, and left the rest where it was.
     proved: bool,
-    news: Option<RestNews>,
+    news: Vec<LiveNews>,
     blind: Blind,
 }
 
@@ -93,7 +93,7 @@ impl Pipeline {
             search: None,
             release: Release::default(),
             proved: false,
-            news: None,
+            news: Vec::new(),
             blind: Blind::default(),
         }
     }
@@ -212,10 +212,10 @@ impl Pipeline {
         self.end_touch();
     }
 
-    /// What has come to pass with the rest at the last sample.
+    /// What has come to pass with the rest and the gauges at the last sample.
     #[must_use]
-    pub fn news(&self) -> Option<RestNews> {
-        self.news
+    pub fn news(&self) -> &[LiveNews] {
+        &self.news
     }
 
     /// Whether rest is being taken just now.
@@ -252,7 +252,7 @@ impl Pipeline {
 
     /// Takes a sample in and says what it means.
     pub fn push(&mut self, sample: &Sample) -> LiveUpdate {
-        self.news = None;
+        self.news.clear();
         let step_s = self.step(sample.time_us);
         let counts: Option<Vec<f64>> = (self.settings.channels.iter())
             .map(|&c| sample.counts.get(c).copied())
@@ -275,8 +275,9 @@ impl Pipeline {
             return nothing;
         };
         self.matching.used = self.checking.used();
-        let (blind, is_news) = self.blind.look(&self.matching, &self.ground.noise);
-        self.news = is_news.then_some(RestNews::Blind(blind));
+        let blind = self.blind.look(&self.matching, &self.ground.noise);
+        self.news.extend(self.blind.news(blind, step_s));
+        self.news.extend(self.checking.news(step_s));
         self.take_jumps_off(step_s, &mut raw, &mut strain);
         self.feel(&strain);
         let (touches, explained) = if self.feeling.touching {
@@ -295,15 +296,12 @@ impl Pipeline {
         let stands = may_be_off && self.release.stands(&mut self.matching, &strain, step_s);
         if stands || self.release.is_sure(self.proved) {
             self.tare();
-            self.news = Some(RestNews::Released);
+            self.news.push(LiveNews::Released);
             return nothing;
         }
         let contact = (touches.as_ref()).and_then(|t| t.contacts.first().copied());
-        let guesses = if contact.is_some() {
-            self.trained.guess(&strain, &self.matching.used)
-        } else {
-            [None; 3]
-        };
+        let guess = |_| self.trained.guess(&strain, &self.matching.used);
+        let guesses = contact.map_or([None; 3], guess);
         if self.last.is_some() && contact.is_some() {
             let read = (&strain[..], &self.ground.noise[..]);
             (self.checking).look(&mut self.matching, sample.time_us, read);
@@ -354,7 +352,7 @@ impl Pipeline {
         };
         strain[jump.channel] -= jump.by;
         (self.ground).jumped(&jump, &self.settings, &self.matching.used);
-        self.news = jump.news().or(self.news);
+        self.news.extend(jump.news());
     }
 
     fn go_on_taring(&mut self, time_us: u64, counts: &[f64]) {
@@ -364,7 +362,7 @@ impl Pipeline {
         let waited = taring.is_waiting();
         let rest = taring.push(time_us, counts);
         if taring.is_waiting() && !waited {
-            self.news = Some(RestNews::Waiting);
+            self.news.push(LiveNews::Waiting);
         }
         if let Some(rest) = rest {
             let hum = std::mem::take(&mut taring.hum);

@@ -1,7 +1,7 @@
 //! The rest that readings are held against: taken under a touch it is none, and that shows.
 
 use hapdef::board::{Faults, PressScript, RandomPresses};
-use hapdef::live::RestNews;
+use hapdef::live::LiveNews;
 use hapdef::uncertainty::Making;
 
 use crate::inference::{Bench, press};
@@ -20,7 +20,7 @@ fn a_rest_that_was_taken_under_a_press_is_taken_again() {
         let mut bench = Bench::new(PressScript::Given(presses), Faults::default(), 0.1e-6);
         let mut off = Vec::new();
         bench.run(4_500, |pipeline, update, truth| {
-            releases += usize::from(pipeline.news() == Some(RestNews::Released));
+            releases += usize::from(pipeline.news().contains(&LiveNews::Released));
             match (truth.touch, update.contact) {
                 (None, Some(_)) if truth.time_us > 1_800_000 => ghosts += 1,
                 (Some(touch), Some(contact)) if truth.time_us > 3_200_000 => {

@@ -195,6 +195,7 @@ fn touches_are_found_where_they_are() {
                 "fy_n",
                 "fz_n",
                 "kind",
+                "left_out",
                 "t_us",
                 "touches",
                 "uncertainty_mm",
@@ -271,7 +272,49 @@ fn an_unplugged_board_is_found_again() {
     assert!(last > before, "{last} after {before}");
 }
 
-/// A recording outlives the program that is killed while it writes it, and says the same each time.
+/// Which gauges fail, how and when, in the lines and in words; and that they are taken back.
+#[test]
+fn gauges_that_fail_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("faults.hapdrec");
+    let recording = recording.to_str().unwrap();
+    let faults = ["--fault", "stuck:2@10+4", "--fault", "noisy:4@12+4"];
+    let once = ["--seconds", "25", "--record", recording];
+    let minute = ["board", "--simulate", "--quality", "draft", "--rate", "500"];
+    let mut board = start(&[&minute[..], &once, &faults].concat());
+    assert!(board.child.wait().unwrap().success());
+    let listening = listen(recording, &["--fast", "--every", "50"]);
+    let lines: Vec<String> = listening.out.iter().collect();
+    let mut seen = Vec::new();
+    for line in lines {
+        let line: Value = serde_json::from_str(&line).unwrap();
+        let second = line["t_us"].as_f64().unwrap() / 1e6;
+        let out: Vec<_> = line["left_out"].as_object().unwrap().iter().collect();
+        let used = line["channels_ok"].as_u64().unwrap();
+        assert!(used == 0 || used == 10 - out.len() as u64, "{line}");
+        for (gauge, why) in out {
+            seen.push((gauge.clone(), why.as_str().unwrap().to_owned(), second));
+        }
+    }
+    for (gauge, why, from) in [("3", "stuck", 10.0), ("5", "noisy", 12.0)] {
+        let ills = seen.iter().filter(|(g, w, _)| g == gauge && w == why);
+        let seconds: Vec<f64> = ills.map(|(.., second)| *second).collect();
+        let (first, last) = (seconds[0] - from, seconds[seconds.len() - 1] - from);
+        assert!((0.0..1.0).contains(&first) && (4.0..5.5).contains(&last));
+    }
+    assert!(seen.iter().all(|(g, ..)| g == "3" || g == "5"), "{seen:?}");
+    let words: Vec<String> = listening.err.iter().collect();
+    let told: Vec<&str> = (words.iter())
+        .filter_map(|w| w.strip_prefix("hapdef: gauge "))
+        .collect();
+    let begins = |k: usize, with: &str| assert!(told[k].starts_with(with), "{told:?}");
+    begins(0, "3 is left out. It does not change");
+    begins(1, "5 is left out. It is far noisier");
+    begins(2, "3 is trusted again");
+    begins(3, "5 is trusted again");
+    assert_eq!(told.len(), 4, "{told:?}");
+}
+
 /// What a board says when it has recorded a minute with some options more, and the rms of what presses along the surface over
 /// what presses, by its truth; nothing where that is not told.
 fn recorded_with(more: &[&str]) -> (Value, Option<f64>) {
@@ -316,6 +359,7 @@ fn a_board_has_the_gain_and_its_touches_the_friction_that_were_asked_for() {
     assert!((0.2..0.4).contains(&aside), "{aside}");
 }
 
+/// A recording outlives the program that is killed while it writes it, and says the same each time.
 #[test]
 fn a_recording_survives_a_kill() {
     let folder = tempfile::tempdir().unwrap();

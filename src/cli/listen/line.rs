@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::dataset::SignalMatrix;
 use crate::inference::{Contact, TouchKind};
 use crate::learning::TouchEstimator;
-use crate::live::{Guess, LiveUpdate, ShownEstimator};
+use crate::live::{Guess, Health, LiveUpdate, ShownEstimator};
 
 /// Where nothing touches.
 const NOTHING: &str = "\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"fx_n\":null,\"fy_n\":null,\"fz_n\":null,\"uncertainty_mm\":null";
@@ -13,7 +13,7 @@ const NOTHING: &str = "\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":nul
 /// Of the touch by one of the estimators. Nulls where nothing touches. `uncertainty_mm` is the radius within which a touch lies with a probability of 90 %;
 /// `force_n` presses straight in, and `fx_n`, `fy_n` and `fz_n` are all of the force. Of several touches, the hardest stands
 /// first and by itself; `count` is null where it is not clear what touches.
-pub(super) fn of(update: &LiveUpdate, estimator: ShownEstimator) -> String {
+pub(super) fn of(update: &LiveUpdate, health: &[Health], estimator: ShownEstimator) -> String {
     let mut line = format!("{{\"t_us\":{},", update.time_us);
     let guess = update
         .by(estimator)
@@ -24,11 +24,15 @@ pub(super) fn of(update: &LiveUpdate, estimator: ShownEstimator) -> String {
         _ => line.push_str(NOTHING),
     }
     several(&mut line, update);
-    end(line, update)
+    end(line, update, health)
 }
 
 /// As [`of`], by a regression that was learned from presses; its radius holds nine of ten places that it was tested on.
-pub(super) fn learned(update: &LiveUpdate, estimator: &TouchEstimator) -> String {
+pub(super) fn learned(
+    update: &LiveUpdate,
+    health: &[Health],
+    estimator: &TouchEstimator,
+) -> String {
     let mut line = format!("{{\"t_us\":{},", update.time_us);
     let strain = update.strain.as_ref().filter(|_| update.contact.is_some());
     let answer = strain.and_then(|strain| {
@@ -48,17 +52,19 @@ pub(super) fn learned(update: &LiveUpdate, estimator: &TouchEstimator) -> String
         None => line.push_str(NOTHING),
     }
     several(&mut line, update);
-    end(line, update)
+    end(line, update, health)
 }
 
-/// What is said of the gauges themselves.
-fn end(mut line: String, update: &LiveUpdate) -> String {
+/// What is said of the gauges themselves: those that are left out by their numbers, from 1.
+fn end(mut line: String, update: &LiveUpdate, health: &[Health]) -> String {
     let blind = (update.blind).map_or("null".to_owned(), |share| format!("{share:.3}"));
-    let _ = write!(
-        line,
-        ",\"channels_ok\":{},\"blind_share\":{blind}}}",
-        update.good
-    );
+    let _ = write!(line, ",\"channels_ok\":{},\"left_out\":{{", update.good);
+    let ill = (health.iter().zip(1..)).filter(|(health, _)| !health.is_good());
+    for (k, (health, gauge)) in ill.enumerate() {
+        let comma = if k == 0 { "" } else { "," };
+        let _ = write!(line, "{comma}\"{gauge}\":\"{}\"", health.in_words());
+    }
+    let _ = write!(line, "}},\"blind_share\":{blind}}}");
     line
 }
 

@@ -75,7 +75,7 @@ impl Listener {
         self.compare_channels(sample.counts.len(), tell);
         self.doubt_commas(tell);
         let update = self.pipeline.push(sample);
-        if let Some(news) = self.pipeline.news() {
+        for news in self.pipeline.news() {
             tell(SessionEvent::Message(&news.in_words()));
         }
         // What nobody touches is soon computed, and would hide the rest.
