@@ -1,6 +1,5 @@
 //! How much of the surface is blind: where a light touch moves no gauge that is trusted far enough above its noise.
 
-use super::news::LiveNews;
 use crate::inference::Matching;
 use crate::uncertainty::BLIND;
 
@@ -57,7 +56,7 @@ impl Blind {
     }
 
     /// A share, so many seconds after the last one, where that is worth a word.
-    pub fn news(&mut self, share: f64, step_s: f64) -> Option<LiveNews> {
+    pub fn news(&mut self, share: f64, step_s: f64) -> Option<f64> {
         let since = |is: bool, before: f64| if is { before + step_s } else { 0.0 };
         self.worse_s = since(share > self.said + MUCH, self.worse_s);
         self.better_s = since(share < self.said - MUCH, self.better_s);
@@ -66,7 +65,7 @@ impl Blind {
             // What has become better is worth a word when it becomes as bad again.
             (self.said, self.worse_s, self.better_s) = (share, 0.0, 0.0);
         }
-        is_news.then_some(LiveNews::Blind(share))
+        is_news.then_some(share)
     }
 }
 

@@ -276,7 +276,8 @@ impl Pipeline {
         };
         self.matching.used = self.checking.used();
         let blind = self.blind.look(&self.matching, &self.ground.noise);
-        self.news.extend(self.blind.news(blind, step_s));
+        let news = self.blind.news(blind, step_s);
+        self.news.extend(news.map(LiveNews::Blind));
         self.news.extend(self.checking.news(step_s));
         self.take_jumps_off(step_s, &mut raw, &mut strain);
         self.feel(&strain);

@@ -280,8 +280,18 @@ fn gauges_that_fail_are_named() {
     let recording = recording.to_str().unwrap();
     let faults = ["--fault", "stuck:2@10+4", "--fault", "noisy:4@12+4"];
     let once = ["--seconds", "25", "--record", recording];
-    let minute = ["board", "--simulate", "--quality", "draft", "--rate", "500"];
-    let mut board = start(&[&minute[..], &once, &faults].concat());
+    // Of a coarser converter nobody could tell that a channel does not change.
+    let fine = [
+        "board",
+        "--simulate",
+        "--quality",
+        "draft",
+        "--rate",
+        "500",
+        "--bits",
+        "16",
+    ];
+    let mut board = start(&[&fine[..], &once, &faults].concat());
     assert!(board.child.wait().unwrap().success());
     let listening = listen(recording, &["--fast", "--every", "50"]);
     let lines: Vec<String> = listening.out.iter().collect();
