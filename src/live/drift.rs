@@ -257,7 +257,8 @@ impl Drift {
         let as_it_came = hardest.and_then(|touch| self.misfit.reading(touch.force));
         let read: Vec<f64> = strain.iter().zip(self.rest()).map(|(x, b)| x - b).collect();
         let load = load_of(as_it_came.as_deref().unwrap_or(reading), &read);
-        self.go_on_to(self.now_s, Some(load));
+        let off = misfit::off_by(touches, load, [reading, &read]);
+        self.go_on_to(self.now_s, Some([load, &off]));
         let rest: Vec<f64> = self.walk.rest(0.0).collect();
         for (x, rest) in mean.iter_mut().zip(rest.iter().chain(&rest)) {
             *x -= rest;
@@ -350,11 +351,17 @@ impl Drift {
         Some((mean, samples))
     }
 
-    /// The rest as of another time, under a load (strain) until then, or none.
-    fn go_on_to(&mut self, time_s: f64, load: Option<&[f64]>) {
+    /// The rest as of another time, under a load until then that may read so far beside its model (both strain), or none.
+    fn go_on_to(&mut self, time_s: f64, under: Option<[&[f64]; 2]>) {
         let seconds = (time_s - self.as_of_s).max(0.0);
         self.as_of_s = time_s;
-        self.walk.pass(seconds, load.is_some());
+        self.walk.pass(seconds, under.is_some());
+        if let Some([_, off]) = under {
+            self.walk.go_off(seconds, off);
+        } else {
+            self.walk.let_go();
+        }
+        let load = under.map(|[load, _]| load);
         self.creep.grow(&mut self.walk.covariance, load, seconds);
     }
 

@@ -12,6 +12,8 @@ const HARDER: f64 = 1.25;
 /// error stays the same: as one of that many it counts.
 const DOUBT: f64 = 0.1;
 const BLOCKS: f64 = 50.0;
+/// The share of a reading by which a finger that stands and rolls a little comes to read otherwise than any touch would.
+const ROLLS: f64 = 0.02;
 
 /// What was left when the touch came to where it is.
 #[derive(Default)]
@@ -133,6 +135,21 @@ impl Misfit {
     pub fn forget(&mut self) {
         self.found = None;
     }
+}
+
+/// How far what every channel reads of touches may be off what their model says (strain, a standard deviation), where they load the
+/// channels so, are thought to read so and something is read. Of one that stands where it is known to be: as far as it may have
+/// become another one.
+pub(super) fn off_by(
+    touches: &SeveralTouches,
+    load: &[f64],
+    [reading, read]: [&[f64]; 2],
+) -> Vec<f64> {
+    if matches!(&touches.contacts[..], [touch] if touch.narrow) {
+        return load.iter().map(|x| ROLLS * x.abs()).collect();
+    }
+    let pairs = reading.iter().zip(read);
+    pairs.map(|(r, x)| DOUBT * r.abs().max(x.abs())).collect()
 }
 
 /// Of what is left of a wide stretch of places, whose touch reads so much (strain).

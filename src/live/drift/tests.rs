@@ -70,3 +70,14 @@ fn the_end_of_a_touch_is_no_rest() {
         }
     }
 }
+
+/// Beside what is held a touch may be thought to read a thousand times as much as is read: that loads nothing.
+#[test]
+fn what_loads_the_channels_is_no_more_than_is_read() {
+    let read = [20e-6, -5e-6, 1e-6];
+    let near = [18e-6, -5e-6, 2e-6];
+    assert_eq!(load_of(&near, &read), near);
+    // Of what is read this leaves more than it explains.
+    assert_eq!(load_of(&[20e-3, -5e-3, 1e-3], &read), read);
+    assert_eq!(load_of(&[-18e-6, 5e-6, -2e-6], &read), read);
+}

@@ -1,14 +1,20 @@
 //! What the rest of all channels is since a tare, and how it walks: each channel for itself, and all together at a speed
 //! that changes, every one of them by a factor of its own.
 //!
-//! The state is (e, D, v, δ), 2 n + 2 numbers for n channels, and the rest b = e + (1 + δ) D. In a time Δ
+//! The state is (e, D, v, δ, m), 3 n + 2 numbers for n channels, and the rest b = e + (1 + δ) D. In a time Δ
 //!
 //! ```text
 //! e ← e + w                w ~ N(0, diag(q²) Δ)
 //! D ← D + v Δ + w'         w' ~ N(0, q_D² Δ)
 //! v ← v + w″               w″ ~ N(0, q_v² Δ)
 //! δ ← a δ + w‴             w‴ ~ N(0, u² (1 − a²)), a² = exp(−Δ/T), of which a touch says nothing
+//! m ← k m + w⁗             w⁗ ~ N(0, s² (1 − k²)), k = exp(−Δ/S)
 //! ```
+//!
+//! m is what a touch reads beside what its model says, of deviation s, and is read with b as long as it lasts. It goes slowly:
+//! taken for noise, the rest would seem to be known better and better, and would follow it (a bias as a state of its own:
+//! B. Friedland, IEEE Trans. Automatic Control 14, 359, 1969). Where the ways in which a touch may be another one are nearly those
+//! in which the rest may be off, it would be moved far to explain a little.
 //!
 //! D is how far all have drifted since the last correction at rest: what lies before is in e. The mean of δ is nothing:
 //! half as large a D with factors twice as large would be the same.
@@ -48,6 +54,8 @@ const BELIEVED_S: f64 = 5.0;
 const HALF_UNEVEN: f64 = 0.05;
 const UNEVEN: f64 = 0.1;
 const CHANGES_S: f64 = 200.0;
+/// Seconds in which what a touch reads beside its model becomes another (S).
+const OTHER_S: f64 = 10.0;
 /// Of so many directions of δ something has to be known before u is thought to be larger: a drift that has just begun tells nothing
 /// yet.
 const FEWEST: f64 = 2.0;
@@ -63,7 +71,7 @@ const TARED_MOST: f64 = 3.0;
 
 /// The rest of every channel and what is known of its steps.
 pub(super) struct RestWalk {
-    /// (e, D, v, δ).
+    /// (e, D, v, δ, m).
     state: DVector<f64>,
     /// Its covariance, and what that was after the tare.
     pub covariance: DMatrix<f64>,
@@ -88,7 +96,7 @@ impl RestWalk {
         let n = noise.len();
         let least = |x: &f64| (x / (follows_s * rate.sqrt())).max(OWN).powi(2);
         let least_own: Vec<f64> = noise.iter().map(least).collect();
-        let mut covariance = DMatrix::zeros(2 * n + 2, 2 * n + 2);
+        let mut covariance = DMatrix::zeros(3 * n + 2, 3 * n + 2);
         for (c, x) in noise.iter().enumerate() {
             covariance[(c, c)] = (TARED * x).powi(2);
         }
@@ -96,7 +104,7 @@ impl RestWalk {
         covariance[(n + 1, n + 1)] = SPEED * SPEED;
         spread_factors(&mut covariance, UNEVEN * UNEVEN);
         let mut walk = Self {
-            state: DVector::zeros(2 * n + 2),
+            state: DVector::zeros(3 * n + 2),
             start: covariance.clone(),
             covariance,
             own: least_own.clone(),
@@ -192,8 +200,7 @@ impl RestWalk {
         together += speed;
         if !hidden {
             let kept = (-0.5 * seconds / CHANGES_S).exp();
-            p.rows_mut(n + 2, n).scale_mut(kept);
-            p.columns_mut(n + 2, n).scale_mut(kept);
+            keep(&mut p, n + 2, kept);
             spread_factors(&mut p, self.uneven * (1.0 - kept * kept));
         }
         let least = if hidden { HIDDEN * HIDDEN } else { 0.0 };
@@ -205,10 +212,28 @@ impl RestWalk {
         p
     }
 
-    /// ∂b/∂state: channels × (2 n + 2).
+    /// Seconds of a touch go by that may read so far off what its model says (strain, standard deviations).
+    pub fn go_off(&mut self, seconds: f64, by: &[f64]) {
+        let m = 2 * self.channels() + 2;
+        let kept = (-seconds / OTHER_S).exp();
+        self.state.rows_range_mut(m..).scale_mut(kept);
+        keep(&mut self.covariance, m, kept);
+        for (c, by) in by.iter().enumerate() {
+            self.covariance[(m + c, m + c)] += by * by * (1.0 - kept * kept);
+        }
+    }
+
+    /// Nothing touches any more.
+    pub fn let_go(&mut self) {
+        let m = 2 * self.channels() + 2;
+        self.state.rows_range_mut(m..).fill(0.0);
+        keep(&mut self.covariance, m, 0.0);
+    }
+
+    /// ∂b/∂state: channels × (3 n + 2).
     fn jacobian(&self) -> DMatrix<f64> {
         let n = self.channels();
-        DMatrix::from_fn(n, 2 * n + 2, |c, k| {
+        DMatrix::from_fn(n, 3 * n + 2, |c, k| {
             if k == c {
                 1.0
             } else if k == n {
@@ -231,7 +256,9 @@ impl RestWalk {
     /// the touch may be another one in some ways; nothing where rounding has left no covariance.
     fn innovation(&self, variance: &[f64], used: &[bool], ways: &[Vec<f64>]) -> Option<Innovation> {
         let trusted: Vec<usize> = (0..used.len()).filter(|&k| used[k]).collect();
-        let by = self.jacobian();
+        let n = self.channels();
+        let mut by = self.jacobian();
+        by.columns_mut(2 * n + 2, n).fill_with_identity();
         let seen = by.select_rows(&trusted) * &self.covariance;
         let mut inner = &seen * by.select_rows(&trusted).transpose();
         inner += DMatrix::from_diagonal(&among(variance, &trusted));
@@ -317,7 +344,7 @@ impl RestWalk {
     pub fn settle(&mut self) {
         let n = self.channels();
         let by = self.jacobian();
-        let mut into = DMatrix::identity(2 * n + 2, 2 * n + 2);
+        let mut into = DMatrix::identity(3 * n + 2, 3 * n + 2);
         into.rows_mut(0, n).copy_from(&by);
         into[(n, n)] = 0.0;
         let rest: Vec<f64> = self.rest(0.0).collect();
@@ -418,7 +445,7 @@ impl RestWalk {
     }
 }
 
-/// How far readings are expected to be off: the channels that are trusted, what is read of the state (trusted × (2 n + 2)),
+/// How far readings are expected to be off: the channels that are trusted, what is read of the state (trusted × (3 n + 2)),
 /// and the covariance of it all.
 struct Innovation {
     trusted: Vec<usize>,
@@ -439,9 +466,16 @@ fn among(values: &[f64], channels: &[usize]) -> DVector<f64> {
     DVector::from_iterator(channels.len(), channels.iter().map(|&c| values[c]))
 }
 
+/// Keeps a share of as many states as there are channels, from one on.
+fn keep(p: &mut DMatrix<f64>, from: usize, share: f64) {
+    let n = (p.nrows() - 2) / 3;
+    p.rows_mut(from, n).scale_mut(share);
+    p.columns_mut(from, n).scale_mut(share);
+}
+
 /// Makes the factors of all channels uncertain by so much more (variance), and not their mean.
 fn spread_factors(p: &mut DMatrix<f64>, variance: f64) {
-    let n = p.nrows() / 2 - 1;
+    let n = (p.nrows() - 2) / 3;
     for i in 0..n {
         for j in 0..n {
             let of_both = f64::from(u8::from(i == j)) - (n as f64).recip();

@@ -200,3 +200,50 @@ fn a_tare_is_believed_by_and_large() {
         assert!(walk.rest(1.0).all(f64::is_finite), "{n}");
     }
 }
+
+/// What the channels that a touch loads read beside its model stays for a minute, and is no drift: how far the rest has gone is
+/// known as well as is said. Taken for noise of that size it is not.
+#[test]
+fn what_a_touch_reads_beside_its_model_is_not_the_rest() {
+    const LOADED: usize = 5;
+    let beside = |c: usize| {
+        if c < LOADED {
+            4e-6 * (2.0 * c as f64).cos()
+        } else {
+            0.0
+        }
+    };
+    let off_by_deviations = |is_known: bool| {
+        let mut walk = AT_REST.followed(20.0);
+        let deviations: [f64; N] = std::array::from_fn(|c| if c < LOADED { 4e-6 } else { 0.0 });
+        let noise_of =
+            |c: usize| NOISE * NOISE / 2.0 + if is_known { 0.0 } else { deviations[c].powi(2) };
+        let variance: [f64; N] = std::array::from_fn(noise_of);
+        for k in 2001..=8000 {
+            let now = f64::from(k) * STEP_S;
+            walk.pass(STEP_S, true);
+            if is_known {
+                walk.go_off(STEP_S, &deviations);
+            }
+            let read = |c: usize| AT_REST.drifted(c, now) + beside(c) + 0.7 * NOISE * noise(k, c);
+            let off: Vec<f64> = (0..N)
+                .map(read)
+                .zip(walk.rest(0.0))
+                .map(|(x, b)| x - b)
+                .collect();
+            walk.correct((&off, f64::INFINITY), &variance, &[true; N], &[])
+                .unwrap();
+        }
+        walk.let_go();
+        let known = walk.rest_covariance(0.0, false);
+        let off = walk.rest(0.0).enumerate();
+        let off = off.map(|(c, b)| (b - AT_REST.drifted(c, 80.0)).abs() / known[(c, c)].sqrt());
+        off.fold(0.0, f64::max)
+    };
+    let (known, taken_for_noise) = (off_by_deviations(true), off_by_deviations(false));
+    println!("{known:.2} {taken_for_noise:.2} deviations");
+    assert!(
+        known < 3.0 && taken_for_noise > 4.0,
+        "{known} {taken_for_noise}"
+    );
+}
