@@ -137,9 +137,9 @@ impl Misfit {
     }
 }
 
-/// How far what every channel reads of touches may be off what their model says (strain, a standard deviation), where they load the
-/// channels so, are thought to read so and something is read. Of one that stands where it is known to be: as far as it may have
-/// become another one.
+/// How far what each channel reads of touches may be beside what their model says (strain, a standard deviation): of a single one
+/// whose place is known a share of its load, as far as it may have become another one since it came; of others a share of what
+/// they are thought to read or of what is read, whichever is more.
 pub(super) fn off_by(
     touches: &SeveralTouches,
     load: &[f64],
