@@ -310,7 +310,9 @@ fn gauges_that_fail_are_named() {
         let ills = seen.iter().filter(|(g, w, _)| g == gauge && w == why);
         let seconds: Vec<f64> = ills.map(|(.., second)| *second).collect();
         let (first, last) = (seconds[0] - from, seconds[seconds.len() - 1] - from);
-        assert!((0.0..1.0).contains(&first) && (4.0..5.5).contains(&last));
+        // For as long as it lasts, and a little.
+        let told = (0.0..1.0).contains(&first) && (3.9..5.5).contains(&last);
+        assert!(told, "gauge {gauge}: {first} to {last} s");
     }
     assert!(seen.iter().all(|(g, ..)| g == "3" || g == "5"), "{seen:?}");
     let words: Vec<String> = listening.err.iter().collect();
