@@ -81,3 +81,36 @@ fn what_loads_the_channels_is_no_more_than_is_read() {
     assert_eq!(load_of(&[20e-3, -5e-3, 1e-3], &read), read);
     assert_eq!(load_of(&[-18e-6, 5e-6, -2e-6], &read), read);
 }
+
+/// What a touch reads beside its model for a minute is not left behind as a rest.
+#[test]
+fn what_the_model_is_off_by_goes_with_the_touch() {
+    let (noise, used) = ([NOISE; CHANNELS], [true; CHANNELS]);
+    let mut drift = Drift::new(&noise, &[], 5.0, STEP_S.recip());
+    let touches = SeveralTouches {
+        kind: TouchKind::Unclear,
+        probability: 1.0,
+        contacts: Vec::new(),
+        unexplained: 0.0,
+        shares: [0.0; 5],
+    };
+    // A twentieth of it, either way.
+    let reading: Vec<f64> = (0..CHANNELS)
+        .map(|c| 100e-6 * (1.7 * c as f64).sin())
+        .collect();
+    let beside = |c: usize| 1.0 + 0.05 * (2.9 * c as f64).cos();
+    let strain: Vec<f64> = (0..CHANNELS).map(|c| beside(c) * reading[c]).collect();
+    for step in 0..15_500 {
+        drift.pass(STEP_S);
+        if step < 500 {
+            drift.rested(&[0.0; CHANNELS], &noise, &used);
+        } else {
+            drift.touched(&touches, [&strain, &reading], &noise, &used, Vec::new);
+        }
+    }
+    let left: Vec<f64> = drift.rest().map(|b| -b).collect();
+    let squares = drift.squares(&left, &noise, &used)[0];
+    println!("{squares:.1} squares are left");
+    // Far less than the noise of a sample has; taken for noise it would leave 14.
+    assert!(squares < 0.5 * CHANNELS as f64, "{squares}");
+}

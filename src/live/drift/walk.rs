@@ -258,6 +258,7 @@ impl RestWalk {
         let trusted: Vec<usize> = (0..used.len()).filter(|&k| used[k]).collect();
         let n = self.channels();
         let mut by = self.jacobian();
+        // Of nothing that touches m is nothing, and certain.
         by.columns_mut(2 * n + 2, n).fill_with_identity();
         let seen = by.select_rows(&trusted) * &self.covariance;
         let mut inner = &seen * by.select_rows(&trusted).transpose();
