@@ -250,7 +250,7 @@ fn read(
         if let SessionEvent::Hello(hello) = &event {
             asked.board = Some(format!("{:08x}", hello.board));
         }
-        if let SessionEvent::Message(text) | SessionEvent::Trouble(text) = &event {
+        if let Some(text) = event.words() {
             out::say(&format!("hapdef: {text}"));
         }
         if let SessionEvent::Sample {

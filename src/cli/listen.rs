@@ -340,6 +340,7 @@ impl Output {
             }
             SessionEvent::Hello(hello) => self.greet(hello)?,
             SessionEvent::Message(text) | SessionEvent::Trouble(text) => say(text),
+            SessionEvent::News(news) => say(&news.in_words()),
             // Nobody wants to find out afterwards.
             SessionEvent::Unrecorded(why) => anyhow::bail!("{why}"),
             SessionEvent::Truth(touch) => {

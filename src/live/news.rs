@@ -10,6 +10,10 @@ use crate::units;
 pub enum LiveNews {
     /// Something moves while the rest is taken.
     Waiting,
+    /// What moved is still, and the rest is taken.
+    Still,
+    /// It never was still, and is taken for rest as it is.
+    Restless,
     /// The rest was taken under a touch that has let go.
     Released,
     /// On this share of the surface a light touch is not felt.
@@ -21,12 +25,33 @@ pub enum LiveNews {
 }
 
 impl LiveNews {
+    /// Whether this says how it is now with what the other has told of.
+    #[must_use]
+    pub fn follows(self, earlier: Self) -> bool {
+        let of_rest = |news| {
+            matches!(
+                news,
+                Self::Waiting | Self::Still | Self::Restless | Self::Released
+            )
+        };
+        match (self, earlier) {
+            (Self::Gauge(now, _), Self::Gauge(then, _))
+            | (Self::Jumped(now, _), Self::Jumped(then, _)) => now == then,
+            (Self::Blind(_), Self::Blind(_)) => true,
+            _ => of_rest(self) && of_rest(earlier),
+        }
+    }
+
     /// For people, with what to do.
     #[must_use]
     pub fn in_words(self) -> String {
         let words = match self {
             Self::Waiting => {
                 "the gauges move: the rest is taken as soon as they are still. Do not touch the limb"
+            }
+            Self::Still => "the gauges are still: the rest is taken",
+            Self::Restless => {
+                "the gauges are never still: what they read on the mean is taken for rest. Tare again when nothing moves the limb"
             }
             Self::Released => {
                 "the rest was taken while something pressed: it is taken again. Where this comes with every touch, the gauges are wired the wrong way round"

@@ -360,11 +360,8 @@ impl Pipeline {
         let Some(taring) = &mut self.taring else {
             return;
         };
-        let waited = taring.is_waiting();
         let rest = taring.push(time_us, counts);
-        if taring.is_waiting() && !waited {
-            self.news.push(LiveNews::Waiting);
-        }
+        self.news.extend(taring.news());
         if let Some(rest) = rest {
             let hum = std::mem::take(&mut taring.hum);
             self.take_rest(rest, hum);

@@ -2,6 +2,7 @@
 
 use super::health::MEDIAN_OF_NORMAL;
 use super::hum::{Hum, HumSamples};
+use super::news::LiveNews;
 use crate::statistics::{mean, median};
 use crate::units;
 
@@ -25,6 +26,8 @@ pub struct Taring {
     begun_us: Option<u64>,
     rows: Vec<(u64, Vec<f64>)>,
     waiting: bool,
+    /// What is worth a word since the last sample.
+    news: Option<LiveNews>,
     /// What hummed while the rest was taken.
     pub(super) hum: Hum,
 }
@@ -51,18 +54,20 @@ impl Taring {
             begun_us: None,
             rows: Vec::new(),
             waiting: false,
+            news: None,
             hum: Hum::default(),
         }
     }
 
-    /// Whether something has moved, and is waited for.
+    /// That something moves and is waited for, or that it is waited for no more. A rest that was there at once is no news.
     #[must_use]
-    pub fn is_waiting(&self) -> bool {
-        self.waiting
+    pub fn news(&self) -> Option<LiveNews> {
+        self.news
     }
 
     /// Takes a sample in; the rest when there were enough that are quiet. While they are not, the oldest part is let go.
     pub fn push(&mut self, time_us: u64, counts: &[f64]) -> Option<Rest> {
+        self.news = None;
         let since = |from: u64| units::seconds(time_us.abs_diff(from));
         let begun = *self.begun_us.get_or_insert(time_us);
         self.rows.push((time_us, counts.to_vec()));
@@ -73,11 +78,21 @@ impl Taring {
         let first = self.rows[0].0;
         let timed = |(at, row): &(u64, Vec<f64>)| (units::seconds(at.abs_diff(first)), row.clone());
         let left = self.hum.begin(&self.rows.iter().map(timed).collect());
-        if is_quiet(&left, self.slack) || since(begun) > PATIENCE_S + self.seconds {
+        let quiet = is_quiet(&left, self.slack);
+        if quiet || since(begun) > PATIENCE_S + self.seconds {
             self.rows.clear();
+            let over = if quiet {
+                LiveNews::Still
+            } else {
+                LiveNews::Restless
+            };
+            self.news = self.waiting.then_some(over);
             return Some(rest(&left));
         }
-        self.waiting = true;
+        if !self.waiting {
+            self.waiting = true;
+            self.news = Some(LiveNews::Waiting);
+        }
         self.rows.drain(..self.rows.len().div_ceil(PARTS));
         None
     }
@@ -175,7 +190,7 @@ mod tests {
         assert!((rest.noise[0] - 3.74).abs() < 0.8, "{rest:?}");
         assert!(rest.noise[1] < 0.1);
         assert!((rest.level[2] - 7.0).abs() < 1e-9);
-        assert!(!taring.is_waiting());
+        assert_eq!(taring.news(), None);
     }
 
     /// A tap, while the rest is taken, over noise and a slow drift.
@@ -183,16 +198,19 @@ mod tests {
     fn a_tap_is_no_rest() {
         for from in [0, 100, 300, 420] {
             let mut taring = Taring::over(0.5, 1.0);
+            let mut news = Vec::new();
             let taken = (0..3000_u32).find_map(|k| {
                 let noise = f64::from((k * 7919 + k * k * 31) % 7) - 3.0;
                 let risen = f64::from(k.saturating_sub(from).min(50)) / 50.0;
                 let touch = if k < from + 400 { 8.0 * risen } else { 0.0 };
                 let counts = [2000.0 + noise + touch + 1e-3 * f64::from(k), 700.0 - noise];
-                taring.push(1000 * u64::from(k), &counts)
+                let rest = taring.push(1000 * u64::from(k), &counts);
+                news.extend(taring.news());
+                rest
             });
             let level = taken.unwrap().level[0];
             assert!((level - 2001.0).abs() < 2.0, "{from}: {level}");
-            assert!(taring.is_waiting(), "{from}");
+            assert_eq!(news, [LiveNews::Waiting, LiveNews::Still], "{from}");
         }
     }
 
@@ -207,5 +225,6 @@ mod tests {
             (PATIENCE_S..PATIENCE_S + 2.0).contains(&seconds),
             "{seconds}"
         );
+        assert_eq!(taring.news(), Some(LiveNews::Restless));
     }
 }

@@ -237,6 +237,7 @@ impl Session {
             Ok(connection) => {
                 self.live.connection = Some(connection);
                 self.live.applied = Some(live);
+                self.news.forget_board();
                 self.news.happened(Happening::Connected);
             }
             Err(message) => self.complain(message),

@@ -2,11 +2,15 @@
 
 use std::path::PathBuf;
 
-/// Something to tell the user that stays until it is read.
+use crate::live::LiveNews;
+
+/// Something to tell the user that stays until it is read, or is so no more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UserMessage {
     pub text: String,
     pub error: bool,
+    /// What it tells of a board.
+    live: Option<LiveNews>,
 }
 
 /// Something that has happened.
@@ -39,17 +43,30 @@ pub struct SessionNews {
 
 impl SessionNews {
     pub fn tell(&mut self, text: impl Into<String>) {
-        self.messages.push(UserMessage {
-            text: text.into(),
-            error: false,
-        });
+        self.say(text.into(), false, None);
     }
 
     pub fn complain(&mut self, text: impl Into<String>) {
-        self.messages.push(UserMessage {
-            text: text.into(),
-            error: true,
-        });
+        self.say(text.into(), true, None);
+    }
+
+    /// What a board has to say now takes the place of what it said of the same thing before.
+    pub fn report(&mut self, news: LiveNews) {
+        let is_over = |m: &UserMessage| m.live.is_some_and(|told| news.follows(told));
+        self.messages.retain(|message| !is_over(message));
+        self.say(format!("Board: {}", news.in_words()), false, Some(news));
+    }
+
+    /// Another board is listened to.
+    pub(super) fn forget_board(&mut self) {
+        self.messages.retain(|message| message.live.is_none());
+    }
+
+    /// What is said again is not said twice.
+    fn say(&mut self, text: String, error: bool, live: Option<LiveNews>) {
+        let message = UserMessage { text, error, live };
+        self.messages.retain(|said| *said != message);
+        self.messages.push(message);
     }
 
     /// A message was read.
@@ -71,5 +88,47 @@ impl SessionNews {
     /// What has happened since the last call, in its order.
     pub fn take_events(&mut self) -> Vec<Happening> {
         std::mem::take(&mut self.events)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::live::Health;
+
+    fn texts(news: &SessionNews) -> Vec<&str> {
+        news.messages.iter().map(|m| &*m.text).collect()
+    }
+
+    #[test]
+    fn what_is_over_makes_room_for_what_is() {
+        let mut news = SessionNews::default();
+        news.tell("Saved");
+        news.report(LiveNews::Gauge(2, Health::Stuck));
+        news.report(LiveNews::Gauge(4, Health::Noisy));
+        news.report(LiveNews::Waiting);
+        news.report(LiveNews::Gauge(2, Health::Good));
+        news.report(LiveNews::Still);
+        let said = texts(&news);
+        assert_eq!(said[0], "Saved");
+        assert!(said[1].starts_with("Board: gauge 5 is left out"));
+        assert_eq!(
+            said[2..],
+            [
+                "Board: gauge 3 is trusted again",
+                "Board: the gauges are still: the rest is taken"
+            ]
+        );
+        news.forget_board();
+        assert_eq!(texts(&news), ["Saved"]);
+    }
+
+    #[test]
+    fn what_is_said_again_is_not_said_twice() {
+        let mut news = SessionNews::default();
+        for text in ["a.stl: no such file", "Saved", "a.stl: no such file"] {
+            news.complain(text);
+        }
+        assert_eq!(texts(&news), ["Saved", "a.stl: no such file"]);
     }
 }

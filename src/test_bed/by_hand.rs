@@ -110,14 +110,14 @@ impl HandRun {
         let (_commands, inbox) = channel();
         let stop = AtomicBool::new(false);
         let ended = Listener::new(board, pipeline).run(&stop, &inbox, |event| {
+            if let Some(text) = event.words() {
+                tell(HandSays::Board(text.into_owned()));
+            }
             match event {
                 SessionEvent::Hello(hello) => desk.recorder.hello(hello),
                 // What was felt before is over, and its clock may begin anew.
                 SessionEvent::State(state) if *state != ConnectionState::Live => {
                     desk.wait(&mut tell);
-                }
-                SessionEvent::Message(text) | SessionEvent::Trouble(text) => {
-                    tell(HandSays::Board(text.to_owned()));
                 }
                 SessionEvent::Sample {
                     sample,

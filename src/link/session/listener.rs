@@ -1,5 +1,6 @@
 //! Who listens: the commands that it takes, and the events that it reports.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -9,7 +10,7 @@ use glam::DVec3;
 use super::timing::Timing;
 use crate::link::counted_line::CountedLine;
 use crate::link::{Address, HeldConnection, Port, Recorder, Truths};
-use crate::live::{LiveUpdate, Pipeline, Receiver, Rest, Sample, Traffic, Unusable};
+use crate::live::{LiveNews, LiveUpdate, Pipeline, Receiver, Rest, Sample, Traffic, Unusable};
 use crate::wire::{Hello, WireMessage, encode};
 
 /// How the connection stands.
@@ -44,6 +45,8 @@ pub enum SessionEvent<'a> {
     },
     /// What the board says, or how a recording was; safe to show.
     Message(&'a str),
+    /// What comes to pass with the rest and the gauges.
+    News(LiveNews),
     /// Why nothing that comes can be used; each reason once.
     Trouble(&'a str),
     /// Why a recording could not begin, or ended by itself.
@@ -55,6 +58,18 @@ pub enum SessionEvent<'a> {
         pipeline: &'a Pipeline,
         recorder: Option<&'a Recorder>,
     },
+}
+
+impl SessionEvent<'_> {
+    /// What it says to whoever looks on, where it says anything.
+    #[must_use]
+    pub fn words(&self) -> Option<Cow<'_, str>> {
+        match self {
+            Self::Message(text) | Self::Trouble(text) => Some(Cow::Borrowed(text)),
+            Self::News(news) => Some(Cow::Owned(news.in_words())),
+            _ => None,
+        }
+    }
 }
 
 /// What can be asked of a connection.

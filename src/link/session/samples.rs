@@ -76,7 +76,7 @@ impl Listener {
         self.doubt_commas(tell);
         let update = self.pipeline.push(sample);
         for news in self.pipeline.news() {
-            tell(SessionEvent::Message(&news.in_words()));
+            tell(SessionEvent::News(*news));
         }
         // What nobody touches is soon computed, and would hide the rest.
         if update.contact.is_some() {

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::gathering::Gathering;
 use crate::link::{ConnectionState, SessionEvent};
-use crate::live::{Health, LiveUpdate, ShownEstimator, Traffic};
+use crate::live::{Health, LiveNews, LiveUpdate, ShownEstimator, Traffic};
 use crate::wire::Hello;
 
 /// How long a trail lasts, and strips reach back (s).
@@ -59,6 +59,8 @@ pub struct Feed {
     /// Where a simulated board is really touched (m, N).
     pub truth: Option<(DVec3, f64)>,
     pub messages: Vec<String>,
+    /// What came to pass with the rest and the gauges, each thing once.
+    pub news: Vec<LiveNews>,
     /// Why nothing that comes can be used.
     pub trouble: Option<String>,
     /// How it ended.
@@ -128,6 +130,11 @@ impl Feed {
             SessionEvent::Clock { .. } => false,
             SessionEvent::Message(text) | SessionEvent::Unrecorded(text) => {
                 self.say(text);
+                true
+            }
+            SessionEvent::News(news) => {
+                self.news.retain(|told| !news.follows(*told));
+                self.news.push(*news);
                 true
             }
             SessionEvent::Trouble(text) => {

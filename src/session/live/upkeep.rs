@@ -14,12 +14,19 @@ use crate::session::state::Session;
 impl Session {
     /// Looks after the connection.
     pub(in crate::session) fn refresh_live(&mut self) {
-        let (messages, ended) = match self.live.feed.lock() {
-            Ok(mut feed) => (std::mem::take(&mut feed.messages), feed.ended.take()),
+        let (messages, news, ended) = match self.live.feed.lock() {
+            Ok(mut feed) => (
+                std::mem::take(&mut feed.messages),
+                std::mem::take(&mut feed.news),
+                feed.ended.take(),
+            ),
             Err(_) => return,
         };
         for message in messages {
             self.tell(format!("Board: {message}"));
+        }
+        for news in news {
+            self.news.report(news);
         }
         match ended {
             // A recording that is over stays as it was at its end.
