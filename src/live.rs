@@ -12,6 +12,7 @@ mod hum;
 mod jumps;
 mod lately;
 mod left_out;
+mod long_touch;
 mod news;
 pub mod pipeline;
 mod presses;

@@ -124,7 +124,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.table {
         summary::write_table(path, &found.rows)?;
     }
-    check_fit(found.calibration.relative)?;
+    check_fit(&found.calibration)?;
     save(&loaded, &target, &found, board.as_deref())?;
     found.print(&sensing, &target, args.common.json)
 }
@@ -163,14 +163,12 @@ fn check_count(rows: &[PressRow]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Of a reading, the model leaves this share.
-fn check_fit(left: f64) -> anyhow::Result<()> {
-    /// Of any limb that somebody presses where he says more is understood.
-    const MOST: f64 = 0.5;
+/// Refuses what was pressed elsewhere.
+fn check_fit(found: &Calibration) -> anyhow::Result<()> {
     anyhow::ensure!(
-        left < MOST,
+        found.explains(),
         "the presses are of another limb or of other places: of a reading the model leaves {:.0} %. See that the points are those that were pressed, in their order and in millimetres, and that the channels are those of the gauges. Nothing was saved",
-        100.0 * left
+        100.0 * found.relative
     );
     Ok(())
 }

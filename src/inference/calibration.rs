@@ -370,7 +370,16 @@ fn zero_of(excess: impl Fn(f64) -> f64) -> f64 {
     high
 }
 
+/// The share of a reading that may be left of any limb that somebody presses where he says.
+const MOST_LEFT: f64 = 0.5;
+
 impl Calibration {
+    /// Whether the touches are of this limb and of these places, as far as what is left of their readings tells.
+    #[must_use]
+    pub fn explains(&self) -> bool {
+        self.relative < MOST_LEFT
+    }
+
     /// The same gauges on a part that is so many times as soft as the one they were compared with.
     #[must_use]
     pub fn on_softer(mut self, factor: f64) -> Self {

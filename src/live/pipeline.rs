@@ -293,8 +293,9 @@ impl Pipeline {
         if let (Some(touches), true) = (&touches, explained) {
             self.tell_least_of_several(touches);
         }
-        let may_be_off = self.feeling.touching && !self.proved;
-        let stands = may_be_off && self.release.stands(&mut self.matching, &strain, step_s);
+        let now = (is_found, step_s);
+        let stands = self.feeling.touching
+            && (self.release).stands(&mut self.matching, &strain, now, self.proved);
         if stands || self.release.is_sure(self.proved) {
             self.tare();
             self.news.push(LiveNews::Released);

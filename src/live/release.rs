@@ -2,6 +2,7 @@
 //! touch then, but for their sign, and nothing pulls at a limb. Two touches may read much like a pull at a third place:
 //! they are held against it.
 
+use super::long_touch::LongTouch;
 use super::pull;
 use super::standing::StandingTouch;
 use crate::inference::{Contact, Matching, Several};
@@ -29,13 +30,21 @@ pub struct Release {
     /// When it was asked whether several touches would do (µs), and whether a pull was likelier.
     asked: Option<(u64, bool)>,
     standing: StandingTouch,
+    long: LongTouch,
 }
 
 impl Release {
-    /// Whether what is felt is rather a rest that is off than a touch that stands, of a reading (strain) some seconds after
-    /// the one before.
-    pub fn stands(&mut self, matching: &mut Matching, strain: &[f64], step_s: f64) -> bool {
-        self.standing.is_rather_the_rest(matching, strain, step_s)
+    /// Whether what is felt is rather a rest that is off, and nobody has come back to so far, than a touch that stands; of a
+    /// reading (strain) some seconds after the one before, in which touches are found or none.
+    pub fn stands(
+        &mut self,
+        matching: &mut Matching,
+        strain: &[f64],
+        now: (bool, f64),
+        proved: bool,
+    ) -> bool {
+        self.long.take(matching, strain, now);
+        !proved && (self.standing).is_rather_the_rest(matching, strain, now.1)
     }
 
     /// Whether a reading (strain, at a time in µs) is rather of something that lets go than of the touch that explains it
@@ -49,8 +58,8 @@ impl Release {
         proved: bool,
     ) -> bool {
         let worse = if proved { WORSE } else { WORSE_AT_FIRST };
-        // A pull would have to leave less than nothing.
-        if touch.unexplained < worse {
+        // Else a pull would have to leave less than nothing.
+        if touch.unexplained < worse || self.long.is_on(matching, strain) {
             self.looks = 0;
             return false;
         }

@@ -68,12 +68,19 @@ impl StandingTouch {
 
 /// Whether a reading is another one, by the noise of the channels that are trusted.
 fn is_off(matching: &Matching, strain: &[f64], from: &[f64]) -> bool {
+    let squares: Vec<f64> = squares_off(matching, strain, from).collect();
+    squares.iter().sum::<f64>() > chi_squared_bound(squares.len() as f64, OFF)
+}
+
+/// What a reading is off another one by, in squares of the noise, of each channel that is trusted.
+pub(super) fn squares_off(
+    matching: &Matching,
+    strain: &[f64],
+    from: &[f64],
+) -> impl Iterator<Item = f64> {
     let channels = strain.iter().zip(from).zip(&matching.errors.noise);
     let trusted = channels.zip(&matching.used).filter(|(_, used)| **used);
-    let squares: Vec<f64> = trusted
-        .map(|(((x, y), noise), _)| ((x - y) / noise).powi(2))
-        .collect();
-    squares.iter().sum::<f64>() > chi_squared_bound(squares.len() as f64, OFF)
+    trusted.map(|(((x, y), noise), _)| ((x - y) / noise).powi(2))
 }
 
 /// Whether something that lets go explains it better than a touch does.
@@ -87,14 +94,21 @@ fn reads_like_a_pull(matching: &mut Matching, strain: &[f64]) -> bool {
 mod tests {
     use super::*;
     use crate::inference::ReadingErrors;
+    use crate::inference::ResponseMap;
     use crate::inference::matching::tests::{CHANNELS, maps};
+    use std::sync::Arc;
 
-    /// Levels (times the reading of a newton at one place), a second each: when it is taken for the rest.
+    /// Levels (times what is read of a newton at one place), a second each: when it is taken for the rest.
     fn taken(levels: &[f64], is_pull: bool) -> Option<usize> {
         let [map, _] = maps();
-        let at_one_node = &map.values()[CHANNELS..2 * CHANNELS];
         let size = if is_pull { -1.0 } else { 1.0 };
-        let reading: Vec<f64> = at_one_node.iter().map(|g| size * g).collect();
+        let at_one_node = map.values()[CHANNELS..2 * CHANNELS].iter();
+        let reading: Vec<f64> = at_one_node.map(|g| size * g).collect();
+        taken_of(map, levels, &reading)
+    }
+
+    /// Levels (times a reading), a second each: when it is taken for the rest.
+    fn taken_of(map: Arc<ResponseMap>, levels: &[f64], reading: &[f64]) -> Option<usize> {
         let errors = ReadingErrors::of_noise(1e-7, CHANNELS);
         let mut matching = Matching::new(map, errors, 60.0);
         let mut standing = StandingTouch::default();
@@ -113,5 +127,19 @@ mod tests {
         assert_eq!(taken(&[8.0, 12.0, 8.5, 12.0, 9.0], true), None);
         // A touch that reads like no pull stands as long as it likes.
         assert_eq!(taken(&[8.0, 12.0, 8.0, 5.0, 8.0], false), None);
+    }
+
+    /// A touch at one place reads much like a pull at another.
+    #[test]
+    fn of_a_touch_and_a_pull_what_explains_it_better_is_believed() {
+        let [map, _] = maps();
+        let [here, there] = [[1e-6, 2e-6, -1e-6, 2e-6], [-1e-6, -1.5e-6, 1e-6, -2.5e-6]];
+        let mut values = vec![1e-9; map.values().len()];
+        values[..CHANNELS].copy_from_slice(&here);
+        values[CHANNELS..2 * CHANNELS].copy_from_slice(&there);
+        let map = Arc::new(ResponseMap::of(Arc::clone(&map.mesh), CHANNELS, values));
+        let levels = [8.0, 12.0, 8.0, 5.0, 8.0, 8.0];
+        assert_eq!(taken_of(Arc::clone(&map), &levels, &here), None);
+        assert_eq!(taken_of(map, &levels, &there.map(|g| -g)), Some(4));
     }
 }

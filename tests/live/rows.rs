@@ -208,9 +208,13 @@ fn a_standing_touch_outlives_a_drift_and_light_ones_are_felt_under_it() {
 /// Glued as a workshop does it, so that nobody knows of how unevenly gauges feel what all of them feel.
 #[test]
 fn a_light_touch_stands_for_ten_minutes() {
+    stands_for_ten_minutes("ten minutes", Bench::of);
+}
+
+fn stands_for_ten_minutes(name: &str, bench: impl Fn(Vec<Press>) -> Bench) {
     let place = places(20)[3];
     let standing = Press::new(20.0, 600.0, place, 1.0);
-    let bench = Bench::of(vec![standing, Press::new(640.0, 3.0, place, 10.0)]);
+    let bench = bench(vec![standing, Press::new(640.0, 3.0, place, 10.0)]);
     let glued = ["--rate", "100", "--bits", "16", "--warming", "2"];
     let (heard, _) = listen(&bench.record(&glued), &bench.project(&[]));
     let (unfelt, ghosts) = (bench.unfelt(&heard), bench.ghosts(&heard, 0.0));
@@ -219,21 +223,55 @@ fn a_light_touch_stands_for_ten_minutes() {
         .flat_map(|h| h.touches.iter().map(|t| t.1))
         .collect();
     let force = forces.iter().sum::<f64>() / forces.len() as f64;
-    println!("ten minutes: {unfelt:?} not felt, {force:.2} N in the last, {ghosts} ghosts");
+    println!("{name}: {unfelt:?} not felt, {force:.2} N in the last, {ghosts} ghosts");
     hold(
         unfelt.is_empty() && ghosts == 0 && (force - 1.0).abs() < 0.25,
         "felt, 1 N and no ghosts",
     );
 }
 
-/// The ten gauges of the bundled limb are kind to us: with these others a standing touch was lost after a minute and a half,
-/// or left ghosts, and a tap did so where noise is least.
+/// Four minutes of one that rolls by two millimetres to and fro: what it reads beside its model stays, and is not the rest.
+#[test]
+fn a_finger_that_rolls_leaves_nothing_behind() {
+    const HALF_S: f64 = 8.0;
+    let place = places(20)[5];
+    let aside = DVec3::new(-place.y, place.x, 0.0).normalize();
+    // One press hands over to the next.
+    let rolled = |k: u32| Press {
+        ramp_ms: 500.0 * HALF_S,
+        ..Press::new(
+            10.0 + HALF_S * f64::from(k),
+            1.5 * HALF_S,
+            place + 2.0 * f64::from(k % 2) * aside,
+            3.0,
+        )
+    };
+    let mut presses: Vec<Press> = (0..30).map(rolled).collect();
+    presses.push(Press::new(274.0, 3.0, place, 10.0));
+    let bench = Bench::of(presses);
+    let glued = ["--rate", "100", "--bits", "16", "--warming", "1"];
+    let (heard, _) = listen(&bench.record(&glued), &bench.project(&[]));
+    let ghosts = bench.ghosts(&heard, 0.0);
+    let stands = |h: &&Heard| (15.0..250.0).contains(&h.time_s);
+    let all = heard.iter().filter(stands);
+    let (one, of) = (all.clone().filter(|h| h.touches.len() == 1), all.count());
+    let one = one.count() as f64 / of as f64;
+    println!("rolls: {one:.3} are one, {ghosts} ghosts");
+    hold(one > 0.99 && ghosts == 0, "one and no ghosts");
+}
+
+/// The ten gauges of the bundled limb are kind to us: with these others a standing touch was lost after a minute and a half
+/// or eight, or left ghosts, and a tap did so where noise is least.
 #[test]
 fn other_gauges_do_so_too() {
     // They are of the bundled limb.
     if other_limb().is_some() {
         return;
     }
+    // There the model lacks just so much that a pull did better once in a thousand looks.
+    stands_for_ten_minutes("library-0, ten minutes", |p| {
+        Bench::with_ten("library-0", p)
+    });
     let places = places(40);
     // It goes on for a while after the standing touch.
     let standing = || {

@@ -286,13 +286,58 @@ impl Session {
     }
 
     fn take_calibration(&mut self, found: &Calibration) {
+        let left = 100.0 * found.relative;
+        if !found.explains() {
+            return self.complain(format!(
+                "Not calibrated: the known touches are of another limb or of other places; of a reading the model leaves {left:.0} %. See that each was pressed where the cross was, with the force that was set, and that every gauge is on its channel"
+            ));
+        }
+        let misfits = (self.known_list())
+            .filter(|(_, touch)| touch.used && touch.is_misfit())
+            .count();
         let presses = self.presses_to_keep();
         let project = &mut self.document.state.project;
         (project.live).take(found, &project.selection.sites, presses);
+        let doubt = match misfits {
+            0 => String::new(),
+            1 => ". One does not fit the others: leave it out, or press it again".into(),
+            some => format!(". {some} do not fit the others: leave them out, or press them again"),
+        };
         self.tell(format!(
-            "Calibrated with {} known touches; what is still off is about {:.1} % of a reading",
-            found.touches,
-            100.0 * found.relative
+            "Calibrated with {} known touches; what is still off is about {left:.1} % of a reading{doubt}",
+            found.touches
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::Document;
+    use crate::inference::AsGlued;
+    use crate::io::opening;
+    use crate::session::Wake;
+
+    #[test]
+    fn presses_of_another_limb_calibrate_nothing() {
+        let mut s = Session::new(
+            Document::new(opening::bundled().unwrap(), None),
+            Wake::default(),
+        );
+        let before = s.document.state.project.live.clone();
+        let mut found = Calibration {
+            glued: vec![AsGlued::from([1.0, 0.0, 0.0, 0.0]); 10],
+            doubts: vec![[0.0; 10]; 10],
+            deviations: vec![0.01; 10],
+            relative: 0.7,
+            touches: 12,
+        };
+        s.take_calibration(&found);
+        assert_eq!(s.document.state.project.live, before);
+        let said = &s.news.messages[0];
+        assert!(said.error && said.text.contains("leaves 70 %"), "{said:?}");
+        found.relative = 0.02;
+        s.take_calibration(&found);
+        assert_eq!(s.document.state.project.live.glued.len(), 10);
     }
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use crate::design::Sensing;
 use crate::document::SensingInputs;
 use crate::inference::KnownPress;
+use crate::inference::calibration::judged::MISFIT;
 use crate::link::{Address, Connection, ConnectionState, Hosted, ListenerCommand};
 use crate::live::LiveUpdate;
 use crate::project::LiveKeys;
@@ -37,6 +38,14 @@ pub struct KnownTouch {
     pub misfit: Option<f64>,
     /// The number of the board that read it, where it has one.
     pub board: Option<String>,
+}
+
+impl KnownTouch {
+    /// Whether it was made otherwise than it says, as far as all others tell.
+    #[must_use]
+    pub fn is_misfit(&self) -> bool {
+        self.misfit.is_some_and(|misfit| misfit > MISFIT)
+    }
 }
 
 /// Trained estimators, and the gauges that they were trained for.

@@ -6,7 +6,6 @@ use super::super::action::BoardAction;
 use super::super::ask::Ask;
 use super::super::form::{number, quantity, rows};
 use super::super::theme;
-use crate::inference::calibration::judged::MISFIT;
 use crate::project::CalibrationKeys;
 use crate::session::{Awaited, KnownTouch, LEAST_KNOWN, WANTED_KNOWN};
 
@@ -89,14 +88,13 @@ fn known_row(ask: &mut Ask<'_>, ui: &mut Ui, shown: usize, (number, touch): (usi
     }
     let force = ui.label(format!("{:.1} N", touch.press.force));
     let misfit = touch.misfit.map_or("…".to_owned(), |m| format!("{m:.1}"));
-    let far = touch.misfit.is_some_and(|m| m > MISFIT);
-    let misfit = if far {
+    let misfit = if touch.is_misfit() {
         RichText::new(misfit).color(theme::STALE)
     } else {
         RichText::new(misfit)
     };
     let mut misfit = ui.label(misfit);
-    if far {
+    if touch.is_misfit() {
         misfit = misfit.on_hover_text(
             "It does not fit the others: it was pressed elsewhere or otherwise than it says. Leave it out, or press it again",
         );
