@@ -4,6 +4,7 @@ mod blind;
 mod by_hand;
 mod checking;
 mod counting;
+mod departure;
 mod drift;
 mod feeling;
 mod ground;

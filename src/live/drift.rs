@@ -325,6 +325,14 @@ impl Drift {
         self.weigh(noise, used);
     }
 
+    /// Every channel's rest may have moved as far as this (strain), unseen.
+    pub fn left_behind(&mut self, strain: &[f64], noise: &[f64], used: &[bool]) {
+        for (channel, by) in strain.iter().enumerate().filter(|(c, _)| used[*c]) {
+            self.walk.covariance[(channel, channel)] += by * by;
+        }
+        self.weigh(noise, used);
+    }
+
     /// Nothing is known of what was gathered.
     fn forget(&mut self) {
         self.waiting.clear();

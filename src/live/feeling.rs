@@ -49,8 +49,9 @@ impl Feeling {
         self.touching && self.below == 0
     }
 
-    /// Takes in a sample's weighted squares, and these with caution, over so many channels.
-    pub fn take(&mut self, [plain, cautious]: [f64; 2], channels: usize) -> Turn {
+    /// Takes in a sample's weighted squares, and these with caution, over so many channels; of a touch that is known to be
+    /// there still, or of what may go.
+    pub fn take(&mut self, [plain, cautious]: [f64; 2], channels: usize, stays: bool) -> Turn {
         let channels = channels as f64;
         // A touch that stands goes on; what is left when most of it has gone, or when no touch reads so, may be what it hid.
         let usual = self.least.map_or(self.usual, |least| least.min(self.usual));
@@ -59,7 +60,7 @@ impl Feeling {
         self.usual += (plain - self.usual) * if self.touching { USUAL } else { 1.0 };
         self.now = plain;
         let begins = channels >= FEWEST && squares > chi_squared_bound(channels, BEGIN);
-        let ends = channels < FEWEST || squares < chi_squared_bound(channels, END);
+        let ends = channels < FEWEST || (!stays && squares < chi_squared_bound(channels, END));
         self.above = if begins { self.above + 1 } else { 0 };
         self.below = if ends { self.below + 1 } else { 0 };
         if !self.touching && self.above >= BEGINS {
@@ -106,14 +107,14 @@ mod tests {
         let mut feeling = Feeling::default();
         for k in 0..200 {
             // The longer it stands the less is known of the rest.
-            feeling.take([200.0, if k < 10 { 200.0 } else { 12.0 }], 10);
+            feeling.take([200.0, if k < 10 { 200.0 } else { 12.0 }], 10, false);
             feeling.found(true, 0.01);
         }
         assert!(feeling.clearly());
         (0..samples)
             .map(|_| {
                 feeling.found(is_found, 0.01);
-                feeling.take(squares, 10)
+                feeling.take(squares, 10, false)
             })
             .collect()
     }
@@ -139,7 +140,7 @@ mod tests {
         let mut feeling = Feeling::default();
         let mut take = |squares: [f64; 2], least: Option<f64>| {
             feeling.found(true, 0.01);
-            let turn = feeling.take(squares, 10);
+            let turn = feeling.take(squares, 10, false);
             feeling.several(least);
             turn
         };

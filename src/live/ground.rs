@@ -129,6 +129,13 @@ impl KnownRest {
         self.tremble.forget();
     }
 
+    /// A touch has gone, and left this (strain since the rest): the rest may have moved as far under it.
+    pub fn left_behind(&mut self, strain: &[f64], used: &[bool]) {
+        if let Some(drift) = &mut self.drift {
+            drift.left_behind(strain, &self.noise, used);
+        }
+    }
+
     /// Weighted squares of a reading without a touch, and these with caution: see [`Drift::squares`].
     pub fn squares(&mut self, strain: &[f64], used: &[bool]) -> [f64; 2] {
         if let Some(drift) = &mut self.drift {

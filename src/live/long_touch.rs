@@ -5,7 +5,7 @@ use super::standing::squares_off;
 use crate::inference::Matching;
 
 /// Seconds after which a touch is one.
-const LONG_S: f64 = 20.0;
+const LONG_S: f64 = 5.0;
 /// Share of its size by which a reading is another one: more than a hand makes that trembles or rolls.
 const OTHER: f64 = 0.5;
 /// Seconds within which the level follows what is read: a drift makes no other reading of it.

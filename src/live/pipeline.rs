@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::blind::Blind;
 use super::checking::Checking;
 use super::counting::Counting;
+use super::departure::Departure;
 use super::feeling::{Feeling, Turn};
 use super::ground::{KnownRest, Under};
 use super::health::Health;
@@ -21,6 +22,7 @@ use crate::learning::TouchEstimator;
 use crate::units;
 use crate::wire::Hello;
 
+mod finding;
 #[cfg(test)]
 mod tests;
 
@@ -59,6 +61,7 @@ pub struct Pipeline {
     /// The reading of the last search everywhere, and what it found.
     search: Option<(Vec<f64>, Contact)>,
     release: Release,
+    departure: Departure,
     /// Whether a touch has come and gone since the tare, and left the rest where it was.
     proved: bool,
     news: Vec<LiveNews>,
@@ -92,6 +95,7 @@ impl Pipeline {
             last: None,
             search: None,
             release: Release::default(),
+            departure: Departure::default(),
             proved: false,
             news: Vec::new(),
             blind: Blind::default(),
@@ -248,6 +252,7 @@ impl Pipeline {
         self.checking.end_touch();
         (self.last, self.searched) = (None, 0);
         self.release.forget();
+        self.departure = Departure::default();
     }
 
     /// Takes a sample in and says what it means.
@@ -302,6 +307,19 @@ impl Pipeline {
             return nothing;
         }
         let contact = (touches.as_ref()).and_then(|t| t.contacts.first().copied());
+        let one = contact.filter(|_| touches.as_ref().is_some_and(|t| t.contacts.len() == 1));
+        let now = (one.map(|c| c.force), step_s);
+        if !self.feeling.touching {
+            self.departure.rest(&strain, step_s);
+        } else if (self.departure).is_over(&mut self.matching, &strain, now) {
+            self.leave(&strain);
+            return LiveUpdate {
+                strain: Some(strain),
+                good: self.matching.used.iter().filter(|u| **u).count(),
+                blind: Some(blind),
+                ..nothing
+            };
+        }
         let guess = |_| self.trained.guess(&strain, &self.matching.used);
         let guesses = contact.map_or([None; 3], guess);
         if self.last.is_some() && contact.is_some() {
@@ -374,7 +392,8 @@ impl Pipeline {
         let used = &self.matching.used;
         let squares = self.ground.squares(strain, used);
         let channels = used.iter().filter(|u| **u).count();
-        match self.feeling.take(squares, channels) {
+        let stays = self.departure.stays(&self.matching, strain);
+        match self.feeling.take(squares, channels, stays) {
             Turn::Same => {}
             Turn::Begins => self.searched = 0,
             Turn::Ends => {
@@ -382,6 +401,13 @@ impl Pipeline {
                 self.end_touch();
             }
         }
+    }
+
+    /// A touch has gone, and all that it leaves (strain) is the rest.
+    fn leave(&mut self, strain: &[f64]) {
+        self.ground.left_behind(strain, &self.matching.used);
+        self.proved = true;
+        self.end_touch();
     }
 
     /// What the sample says of the rest, where it is of touches that explain it or of none.
@@ -394,6 +420,8 @@ impl Pipeline {
                 Under::Touches(touches)
             }
             Some(touches) if !touches.contacts.is_empty() => Under::Unsure,
+            // Whatever it is, it is no rest that has moved.
+            _ if touching && self.departure.stays(&self.matching, strains[1]) => Under::Unsure,
             _ if touching => Under::Strange,
             _ => Under::Nothing {
                 at_rest: self.feeling.at_rest(),
@@ -422,76 +450,5 @@ impl Pipeline {
             }
             _ => 0.0,
         }
-    }
-
-    /// The touches, and whether they explain the sample; nothing where the reading is rather of something that lets go.
-    fn find(&mut self, time_us: u64, strain: &[f64]) -> (Option<SeveralTouches>, bool) {
-        let several = self.counting.track(&self.matching, time_us, strain);
-        if let Some((touches, explained)) = several {
-            let left = if explained {
-                touches.unexplained
-            } else {
-                f64::INFINITY
-            };
-            // What is hardly felt any more is followed as long as it is.
-            if !self.feeling.clearly() || !self.counting.is_due(time_us, left) {
-                self.last = None;
-                return (Some(touches), self.counting.is_settled(left));
-            }
-        }
-        let one = self.find_one(time_us, strain);
-        if one.is_some() || self.feeling.clearly() {
-            self.last = one;
-        }
-        let Some(one) = one else {
-            return (None, false);
-        };
-        (self.counting).see_one(&self.matching, time_us, strain, &one);
-        let several = self.counting.shown().is_some();
-        if several || self.counting.is_due(time_us, one.unexplained) {
-            (self.counting).look(&mut self.matching, time_us, strain, &one);
-        }
-        if let Some(shown) = self.counting.shown() {
-            self.last = None;
-            let settled = self.counting.is_settled(shown.unexplained);
-            return (Some(shown.clone()), settled && !shown.contacts.is_empty());
-        }
-        let clear = one.unexplained < DOUBTFUL * one.strength;
-        let settled = clear && self.counting.is_settled(one.unexplained);
-        (clear.then(|| self.counting.one(one)), settled)
-    }
-
-    /// The touch, if there is one.
-    fn find_one(&mut self, time_us: u64, strain: &[f64]) -> Option<Contact> {
-        let often = f64::from(SEARCH_EVERY).max(SEARCH_EVERY_S * self.rate);
-        let recently = self.searched > 0 && f64::from(self.searched) < often;
-        let clearly = self.feeling.clearly();
-        let last = self.last.filter(|_| recently || !clearly);
-        let known = last.and_then(|last| {
-            if last.narrow {
-                self.matching.track(strain, &last)
-            } else {
-                let (reading, found) = self.search.as_ref()?;
-                self.matching.hold(strain, reading, found)
-            }
-        });
-        if let Some(contact) = known {
-            self.searched += 1;
-            return Some(contact);
-        }
-        if !clearly {
-            // A touch that goes is followed, and not looked for: a little above the noise fits a large force where hardly
-            // anything is felt.
-            return None;
-        }
-        self.searched = 1;
-        let found = self.matching.find(strain);
-        let at = (time_us, strain);
-        let several = &self.counting.several;
-        if (self.release).is_seen(&mut self.matching, several, at, &found, self.proved) {
-            return None;
-        }
-        self.search = Some((strain.to_vec(), found));
-        Some(found)
     }
 }
