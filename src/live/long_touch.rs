@@ -65,7 +65,7 @@ mod tests {
             }
             long.is_on(&matching, &of(force))
         };
-        assert!(!take(8.0, true, 15));
+        assert!(!take(8.0, true, 4));
         // What nothing explains is no touch yet.
         assert!(!take(8.0, false, 60));
         assert!(take(8.0, true, 10));

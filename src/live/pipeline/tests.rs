@@ -92,3 +92,44 @@ fn what_is_known_of_gauges_is_known_of_one_board() {
     pipeline.begin_anew();
     assert_eq!(known(&pipeline), at_first);
 }
+
+/// A finger that stands for a minute while every channel drifts by itself, by more than the finger reads there: share of the
+/// samples in which it is shown, and samples that show anything after it.
+fn stood_under_a_drift() -> [f64; 2] {
+    const SAMPLES: [u64; 3] = [1000, 13_000, 15_000];
+    let mut pipeline = connected();
+    let read = read_touches(&gauged_plate(), &[(340, 3.0)]);
+    let rms = (read.iter().map(|x| x * x).sum::<f64>() / read.len() as f64).sqrt();
+    let scale = pipeline.settings.chain.counts_per_strain();
+    let (mut shown, mut left) = (0.0, 0.0);
+    for k in 1..=SAMPLES[2] {
+        let is_pressed = (SAMPLES[0]..SAMPLES[1]).contains(&k);
+        let drifted = k.saturating_sub(SAMPLES[0]).min(SAMPLES[1] - SAMPLES[0]) as f64;
+        let drifted = rms * drifted / (SAMPLES[1] - SAMPLES[0]) as f64;
+        let count = |(c, x): (usize, &f64)| {
+            let bit = ((7 * k as usize + 3 * c) % 5) as f64 / 2.0 - 1.0;
+            let way = [1.0, -0.7, 0.4, -1.3][c % 4] * if c < 5 { 1.0 } else { -0.6 };
+            let pressed = if is_pressed { *x } else { 0.0 };
+            (LEVEL + bit + scale * (pressed + way * drifted)).round()
+        };
+        let update = pipeline.push(&Sample {
+            time_us: k * STEP_US,
+            counts: read.iter().enumerate().map(count).collect(),
+        });
+        let is_shown = f64::from(u8::from(update.contact.is_some()));
+        if is_pressed && k > SAMPLES[0] + 20 {
+            shown += is_shown / (SAMPLES[1] - SAMPLES[0] - 21) as f64;
+        }
+        if k > SAMPLES[1] + 60 {
+            left += is_shown;
+        }
+    }
+    [shown, left]
+}
+
+#[test]
+fn a_touch_that_stands_is_no_drift_and_leaves_none_behind() {
+    let [shown, left] = stood_under_a_drift();
+    println!("{shown:.3} shown, {left} samples after it");
+    assert!(shown > 0.99 && left == 0.0, "{shown} {left}");
+}
